@@ -1,4 +1,4 @@
-//! A surface of facets: its facets and nodes, what is beside and around them, and closest points.
+//! A surface of facets: its facets and nodes, their neighbors, and closest points.
 
 mod closed;
 mod cones;
@@ -45,15 +45,17 @@ pub(crate) use vicinity::Vicinity;
 
 use shape::{RIM, Rim};
 
-/// Share of a facet, or an edge, by which what is found inside comes out in a step: a tenth of what bodies fly in a
-/// step that are as slow as impacts are, a thousandth of the speed of waves. Faster would throw it.
+/// Largest penetration that is recovered in a step, as a share of the smallest facet or edge. A body at a typical
+/// impact speed, a thousandth of the wave speed, moves ten times as far in a step. Faster recovery would throw it
+/// off.
 pub(crate) const RECOVERY: f64 = 1e-4;
 
-/// A surface of facets, or several: what constraints on surfaces are made of, and what draws them.
+/// A surface of one or more parts, made of facets: the input of constraints between surfaces, and of output on
+/// surfaces.
 ///
-/// Made of facets ([`new`](Self::new)) or as the outer sides of a mesh of cells ([`of_cells`](Self::of_cells)); both
-/// check it: sides, orientation, areas. A constraint takes `&surface` wherever it takes facets, so that one surface
-/// serves all, and its output.
+/// It is built from facets ([`new`](Self::new)) or from the outer sides of a mesh of cells
+/// ([`of_cells`](Self::of_cells)). Both check the sides, the orientation and the areas of the facets. Constraints
+/// accept `&surface` wherever they accept facets, so that one surface serves all constraints and the output.
 ///
 /// ```
 /// use contact_dynamics::contact::{BodyContact, Surface};
@@ -78,23 +80,23 @@ pub struct Surface {
     dimension: usize,
     facets: Vec<Facet>,
     rims: Vec<Rim>,
-    /// The facet across each side, and which of its sides that is.
+    /// The facet across each side, and the index of the side there.
     neighbors: Vec<[Option<(usize, usize)>; 4]>,
     /// Nodes of the facets, sorted.
     nodes: Vec<usize>,
     /// The places among them of the vertices of each facet.
     places: Vec<[usize; 4]>,
-    /// (facet, vertex of the facet) by node, and where those of each place begin.
+    /// (facet, vertex of the facet) for each node, and the first entry of each node in this list.
     around: Vec<(usize, usize)>,
     starts: Vec<usize>,
-    /// The longest side of the smallest facet, in the reference coordinates.
+    /// The longest side of the smallest facet, in the reference configuration.
     finest: f64,
-    /// The mean of the longest sides of all facets there.
+    /// The mean of the longest sides of all facets, in the reference configuration.
     typical: f64,
 }
 
 impl Surface {
-    /// Its facets, in the order given, or of the cells.
+    /// The facets, in the order of the given facets or cells.
     pub fn facets(&self) -> &[Facet] {
         &self.facets
     }
@@ -119,7 +121,7 @@ impl Surface {
         &self.nodes
     }
 
-    /// The nodes that move it, ascending: its own, and those of facets of second order that it has parts of.
+    /// The nodes that move the surface, ascending: its own nodes, and the other nodes of facets of second order.
     pub(crate) fn moved_by(&self) -> Vec<usize> {
         let others = self.facets.iter().filter(|facet| facet.whole.is_some()).flat_map(Facet::all_nodes);
         let mut nodes = self.nodes.clone();
@@ -129,22 +131,23 @@ impl Surface {
         nodes
     }
 
-    /// The place of one of its nodes among them.
+    /// The place of a node in [`nodes`](Self::nodes).
     pub(crate) fn place(&self, node: usize) -> usize {
         self.nodes.partition_point(|&other| other < node)
     }
 
-    /// The places among the nodes of the vertices of a facet; those behind its last vertex have no meaning.
+    /// The places of the vertices of a facet in [`nodes`](Self::nodes); entries behind its last vertex have no
+    /// meaning.
     pub(crate) fn places(&self, facet: usize) -> &[usize; 4] {
         &self.places[facet]
     }
 
-    /// The sides of a facet where the surface ends.
+    /// Whether the surface ends at each side of a facet.
     pub(crate) fn open_sides(&self, facet: usize) -> [bool; 4] {
         self.rims[facet].sides
     }
 
-    /// The facet across a side of a facet, and which of its sides that is; none where the surface ends.
+    /// The facet across a side of a facet, and the index of the side there; none where the surface ends.
     pub(crate) fn neighbor(&self, facet: usize, side: usize) -> Option<(usize, usize)> {
         self.neighbors[facet][side]
     }
@@ -154,7 +157,7 @@ impl Surface {
         self.project_beyond(facet, p, RIM, positions)
     }
 
-    /// As `project`, on a surface that goes on beyond its rim for another share of the facet.
+    /// As `project`, on a surface extended beyond its rim by `beyond` times the size of the facet.
     pub(crate) fn project_beyond(
         &self,
         facet: usize,
@@ -165,7 +168,7 @@ impl Surface {
         self.project_within(facet, p, Rim { beyond, ..self.rims[facet] }, positions)
     }
 
-    /// As `project`, on a facet that goes on beyond all of its sides for a share of itself.
+    /// As `project`, on a facet extended beyond all of its sides by `beyond` times its size.
     pub(crate) fn project_on_plane(
         &self,
         facet: usize,
@@ -181,19 +184,19 @@ impl Surface {
         shape.project(p, rim).map(|foot| (shape, foot))
     }
 
-    /// The facets around a node, with the vertex that it is of each; none if it is no node of the surface.
+    /// The facets around a node, with the vertex of each that is this node; none if the node is not on the surface.
     fn corners_around(&self, node: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         let found = self.nodes.binary_search(&node);
         found.into_iter().flat_map(|place| self.corners_at(place).iter().copied())
     }
 
-    /// The same of the node at a place among those of the surface.
+    /// As `corners_around`, for the node at a place in [`nodes`](Self::nodes).
     #[inline]
     pub(crate) fn corners_at(&self, place: usize) -> &[(usize, usize)] {
         &self.around[self.starts[place]..self.starts[place + 1]]
     }
 
-    /// The facets around the k-th vertex of a facet, itself among them.
+    /// The facets around the k-th vertex of a facet, including this facet.
     pub(crate) fn facets_at(&self, facet: usize, k: usize) -> impl Iterator<Item = usize> + '_ {
         self.corners_at(self.places[facet][k]).iter().map(|&(facet, _)| facet)
     }

@@ -1,4 +1,4 @@
-//! Whether a surface encloses a volume, how large that is, and which parts of it enclose the same body.
+//! Whether a surface encloses a volume, the size of that volume, and which parts of it enclose the same body.
 
 use super::Surface;
 use super::shape::{Foot, Point, Shape, cross, dot, sub};
@@ -9,14 +9,14 @@ impl Surface {
         self.rims.iter().zip(&self.facets).position(|(rim, facet)| rim.sides[..facet.nodes().len()].contains(&true))
     }
 
-    /// A node of a surface without rim at which it touches itself: the facets there are several fans.
+    /// A node at which a surface without rim touches itself: the facets around it form several fans.
     pub(crate) fn pinched_node(&self) -> Option<usize> {
         let groups = self.nodes.iter().zip(self.starts.windows(2));
         let mut groups = groups.map(|(&node, range)| (node, &self.around[range[0]..range[1]]));
         groups.find(|&(node, group)| self.fan(node, group) != group.len()).map(|(node, _)| node)
     }
 
-    /// The number of facets in the fan of the first of the facets around a node.
+    /// The number of facets in the fan that contains the first facet around a node.
     fn fan(&self, node: usize, group: &[(usize, usize)]) -> usize {
         let Some(&(first, vertex)) = group.first() else { return 0 };
         if self.facets[first].nodes().len() == 2 {
@@ -41,7 +41,7 @@ impl Surface {
         self.volume_of(0..self.facets.len(), positions)
     }
 
-    /// The same of some of its facets.
+    /// The volume from some of its facets.
     fn volume_of(&self, facets: impl IntoIterator<Item = usize>, positions: &[Point]) -> f64 {
         let Some(&start) = self.nodes.first() else { return 0.0 };
         let at = |node: usize| sub(positions[node], positions[start]);
@@ -55,9 +55,8 @@ impl Surface {
         facets.into_iter().map(part).sum()
     }
 
-    /// The body that each facet belongs to, by the number of one of its facets. Facets that share nodes, with one
-    /// another or through others, are a part of the surface of one body, and so are the hollows in it: closed parts
-    /// whose normals point into them.
+    /// The body of each facet, by the number of one of the body's facets. Facets connected through shared nodes
+    /// belong to one body. So do the hollows in it: closed parts whose normals point into them.
     pub(crate) fn bodies(&self, positions: &[Point]) -> Vec<usize> {
         let mut bodies = self.parts();
         let mut parts: Vec<Vec<usize>> = vec![Vec::new(); bodies.len()];
@@ -69,7 +68,8 @@ impl Surface {
         let sized = |part: Vec<usize>| (self.volume_of(part.iter().copied(), positions), part);
         let closed: Vec<_> = parts.into_iter().filter(|part| is_closed(&part)).map(sized).collect();
         let (mut hollows, solids): (Vec<_>, Vec<_>) = closed.into_iter().partition(|(volume, _)| *volume < 0.0);
-        // From the outside to the inside. Of solids in each other, as before a press fit, the larger one has the hollow.
+        // From the outside to the inside. Of overlapping solids, as before a press fit, the larger one has the
+        // hollow.
         hollows.sort_by(|one, other| one.0.total_cmp(&other.0));
         for (k, (volume, hollow)) in hollows.iter().enumerate() {
             let x = positions[self.facets[hollow[0]].nodes[0]];

@@ -1,20 +1,20 @@
-//! Cones that hold the normals of facets: made once a search, they tell what surely faces what, and where a surface is
-//! surely no dent, without a look at each pair.
+//! Cones that hold the normals of facets. They are found once per search, and exclude pairs that cannot be in contact
+//! and places that cannot be dents without a look at each pair.
 
 use super::Surface;
 use super::shape::{Point, Shape, cross, dot};
 
-/// How far facets are taken to go on beyond their sides, in shares of themselves.
+/// How far facets are extended beyond their sides, in multiples of their size.
 const BEYOND: f64 = 1.25;
 
-/// What is left for rounding.
+/// Margin for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// A cone that holds all normals of a facet, as far as it is taken to go on.
+/// A cone that holds all normals of a facet and of its extension.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
     axis: Point,
-    /// Of the angle between the axis and the normals at most; infinite if nothing is known of them.
+    /// Bound of the sine of the angle between the axis and the normals; infinite if there is none.
     sine: f64,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct Cones {
 }
 
 impl Cones {
-    /// Finds them where the nodes are now.
+    /// Finds the cones at the current positions.
     pub(crate) fn find(&mut self, surface: &Surface, positions: &[Point]) {
         let Self { of_facets, spreads, finest } = self;
         of_facets.clear();
@@ -76,19 +76,20 @@ impl Cones {
         }));
     }
 
-    /// Whether all facets that share a vertex with one are surely turned from each of its normals by less than the
-    /// angle of this sine, as far as they go on beyond their sides for a share of themselves and a `way`.
+    /// Whether the normals of all facets that share a vertex with a facet surely differ from its normals by less than
+    /// the angle with this sine. The facets are extended beyond their sides by a share of their size plus the length
+    /// `way`.
     pub(super) fn is_even(&self, surface: &Surface, facet: usize, sine: f64, (share, way): (f64, f64)) -> bool {
         let places = &surface.places(facet)[..surface.facets()[facet].nodes().len()];
         let is_even = |&place: &usize| self.spreads[place] < (1.0 - ROUNDING) * sine;
         way <= (BEYOND - share) * self.finest && places.iter().all(is_even)
     }
 
-    /// Whether the mean normal of the node at a place of its surface surely has a cosine below `limit` with all normals
-    /// of a facet of another one (or of this one).
+    /// Whether the mean normal of the node at a place of its surface surely has a cosine below `limit` with all
+    /// normals of a facet of another surface (or of this one).
     ///
-    /// (Means with positive weights are no longer than their weights: of negative cosines the mean direction has none
-    /// that is larger than all of them.)
+    /// The cosine of the mean direction is below any negative bound that holds for all normals around the node,
+    /// because a mean of unit vectors with positive weights is at most as long as the sum of the weights.
     pub(super) fn surely_face(&self, surface: &Surface, place: usize, other: (&Self, usize), limit: f64) -> bool {
         let (others, facet) = other;
         let cone = &others.of_facets[facet];
@@ -103,13 +104,13 @@ mod tests {
     use crate::contact::Facet;
     use crate::contact::surface::shape::{add_scaled, norm};
 
-    /// Values from −1 to 1 that look like chance.
+    /// Pseudorandom values from −1 to 1.
     fn noise(k: usize) -> f64 {
         let x = (k as f64 * 12.9898).sin() * 43_758.545_3;
         2.0 * (x - x.floor()) - 1.0
     }
 
-    /// Squares of 3 × 3, some of them cut in triangles, whose nodes are off a plane at random.
+    /// A mesh of 3 × 3 squares, some of them split into triangles, whose nodes are off a plane at random.
     fn rough(seed: usize, share: f64) -> (Surface, Vec<Point>) {
         let at = |k: usize| [(k % 4) as f64, (k / 4) as f64, 0.0];
         let off = |k: usize| std::array::from_fn(|i| noise(97 * seed + 3 * k + i));
@@ -126,7 +127,7 @@ mod tests {
         (Surface::of_facets(facets, 3, &positions).unwrap(), positions)
     }
 
-    /// Shape functions of points of a facet, beyond its sides by up to a share of it.
+    /// Shape functions at points of a facet, up to a share of it beyond its sides.
     fn points(count: usize, beyond: f64) -> Vec<[f64; 4]> {
         let at = |i: i32| -beyond + (1.0 + 2.0 * beyond) * f64::from(i) / 5.0;
         let all = (0..=5).flat_map(|i| (0..=5).map(move |j| (i, j)));

@@ -1,4 +1,4 @@
-//! How a surface is made of facets: which borders on which, whether all show the same face, and where it ends.
+//! Assembles a surface from facets: finds neighbors and open sides, and checks the orientation.
 
 use super::nodes::points;
 use super::shape::{Point, RIM, Rim};
@@ -12,8 +12,8 @@ fn refuse(facet: usize, reason: &'static str) -> Error {
 }
 
 impl Surface {
-    /// The surface of these facets, given by the indices of their nodes in `coordinates`, which are those of all nodes
-    /// of a mesh in two or three dimensions. Normals point out of the body ([`Facet`]).
+    /// The surface of these facets, given by the indices of their nodes in `coordinates`. These are the coordinates
+    /// of all nodes of a mesh in two or three dimensions. Normals point out of the body ([`Facet`]).
     ///
     /// # Errors
     ///
@@ -106,7 +106,7 @@ impl Surface {
             }
         }
         sides.sort_unstable();
-        // Facets side by side, and whether both show the same face.
+        // Neighboring facets, and whether their orientations agree.
         let mut pairs = Vec::new();
         for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             match *group {
@@ -129,12 +129,13 @@ impl Surface {
         self.orient(&pairs)
     }
 
-    /// Refuses facets turned against their neighbors: of two parts that contradict each other the smaller one.
+    /// Rejects facets with the opposite orientation of their neighbors: of two sets that contradict each other, the
+    /// smaller.
     fn orient(&self, pairs: &[(usize, usize, bool)]) -> Result<()> {
         if pairs.iter().all(|&(.., agree)| agree) {
             return Ok(());
         }
-        // The face of each facet as the first of its part shows it, once the part is walked.
+        // The orientation of each facet relative to the first facet of its part, once it is visited.
         let mut faces: Vec<Option<bool>> = vec![None; self.facets.len()];
         for first in 0..self.facets.len() {
             if faces[first].is_some() {
@@ -170,7 +171,7 @@ impl Surface {
         Ok(())
     }
 
-    /// A vertex is on the rim if a side that ends there is.
+    /// Marks the vertices at the ends of open sides as rim vertices.
     fn find_rim(&mut self) {
         let Self { facets, rims, nodes, places, .. } = self;
         let mut open = vec![false; nodes.len()];

@@ -1,22 +1,23 @@
-//! Nodes in a dent of a surface: what stands on one facet there may press on those beside it as well.
+//! Nodes in a dent of a surface: a node that presses on one facet there may press on the adjacent facets as well.
 
 use super::projection::{Ground, Stand};
 use super::shape::{Location, Point, Shape, cross, dot, norm, sub};
 
-/// How near to the sides of a dent a node is that may come to press on them within a step, in shares of the facet,
-/// beside its way.
+/// Distance from the sides of a dent, as a share of the facet and beyond the node's displacement, within which a node
+/// may come to press on them in a step.
 const NEAR: f64 = 0.25;
 
-/// How far facets of a dent go on as planes beyond their sides for a node within a step, in shares of the facet.
+/// Extension of the facets of a dent as planes beyond their sides within a step, as a share of the facet.
 const BEYOND: f64 = 1.0;
 
-/// Sine of the smallest angle between two sides of a dent. A node that slides over the bottom of a flatter one sinks in
-/// by no more than its way times this; and forces of rows that are nearly the same would be anyone's.
+/// Sine of the smallest angle between two sides of a dent. In a flatter dent, a node that slides over the bottom
+/// penetrates by at most its displacement times this sine. Two nearly parallel rows would not determine their forces.
 const LEAST_SINE: f64 = 0.05;
 
 impl Ground<'_> {
-    /// Where a node that stands like this stands on the other sides of the dent that it is in, or may come to on a way
-    /// of this length: on facets that share a vertex with its own and rise from there, each along its own normal.
+    /// The projections of a node onto the other sides of the dent in which it is, or which it may enter by a
+    /// displacement of length `way`. These sides share a vertex with its own facet and rise from there. Each has its
+    /// own normal.
     pub(crate) fn beside<'a>(&'a self, stand: &'a Stand, way: f64) -> impl Iterator<Item = Stand> + 'a {
         let Self { surface, positions, .. } = *self;
         let nodes = surface.facets()[stand.facet].nodes();
@@ -27,7 +28,7 @@ impl Ground<'_> {
         let near = stand.gap.abs() <= way + NEAR * shape.size() && !self.is_around(stand) && !is_even();
         let corners = if near { nodes } else { &[] };
         corners.iter().enumerate().flat_map(move |(k, &vertex)| {
-            // (What shares a side is met at the first of its two vertices.)
+            // A facet that shares a side is found at the first of the two vertices.
             let is_new = move |facet: usize| {
                 let others = surface.facets()[facet].nodes();
                 facet != stand.facet && !nodes[..k].iter().any(|earlier| others.contains(earlier))
@@ -50,12 +51,12 @@ impl Ground<'_> {
         })
     }
 
-    /// Whether a node is outside over a side or a vertex that facets share: they make no dent there.
+    /// Whether a node is outside over a side or a vertex that facets share. They form no dent for it.
     fn is_around(&self, stand: &Stand) -> bool {
         !stand.is_inside() && stand.distance > 0.0 && !self.is_rounding(stand.distance, stand.facet)
     }
 
-    /// Whether the surfaces of a node and of its facet touch.
+    /// Whether the gap of a node is zero up to rounding.
     fn touches(&self, stand: &Stand) -> bool {
         self.is_rounding(stand.gap, stand.facet)
     }
@@ -64,8 +65,8 @@ impl Ground<'_> {
         length.abs() <= self.rounding * self.surface.facets()[facet].shape(self.positions).size()
     }
 
-    /// Whether a facet that rises from a vertex of that of a stand makes a dent with it: that one rises from it too,
-    /// and so does the point that the node stands on, where its facet has this normal.
+    /// Whether a facet that rises from a vertex of the node's facet forms a dent with it: the node's facet, with this
+    /// normal, must rise from the other facet too, and so must the node's closest point.
     fn is_dent(
         &self,
         (stand, normal): (&Stand, Point),
@@ -80,8 +81,8 @@ impl Ground<'_> {
             && height(beside.normal, shape.point(&stand.weights)) >= -self.rounding * other.size()
     }
 
-    /// Of the sides of a dent that a node touches the one that comes first among the facets: which is the closest is
-    /// anyone's, and would change from step to step.
+    /// The projection onto the first facet, by index, among the sides of a dent that a node touches. Rounding decides
+    /// which of them is the closest, and the closest one would change from step to step.
     pub(crate) fn first_side(&self, stand: Stand, way: f64) -> Stand {
         let comes_first = |beside: &Stand| {
             let is_on = beside.weights.iter().all(|&weight| weight >= -self.rounding);
@@ -92,18 +93,20 @@ impl Ground<'_> {
         first.unwrap_or(stand)
     }
 
-    /// The stand of a node in a dent on its closest facet: where it touches that, along the normal of the facet alone.
+    /// The projection of a node in a dent onto its closest facet; if the node touches it, along the normal of this
+    /// facet alone.
     pub(crate) fn first_in_dent(&self, stand: Stand) -> Stand {
         if self.touches(&stand) { self.in_dent(&stand).unwrap_or(stand) } else { stand }
     }
 
-    /// The stand of a node in a dent on the facet where it is, as far as that goes on as a plane.
+    /// The projection of a node in a dent onto its facet, extended as a plane.
     fn in_dent(&self, stand: &Stand) -> Option<Stand> {
         self.on_plane(stand.place, stand.facet, BEYOND)
     }
 
-    /// Where the k-th stand of a node goes, whose closest facet now is that of `closest`. A single one goes there; of
-    /// those in a dent one does, if there is none yet, and the others stay on their facets.
+    /// The update of the k-th projection of a node whose closest projection now is `closest`. A single projection
+    /// moves to the closest one. Of several in a dent, the one on the closest facet or else the nearest one moves
+    /// there; the others stay on their facets.
     pub(crate) fn followed(&self, stands: &[Stand], k: usize, closest: Option<Stand>) -> Option<Stand> {
         let stand = &stands[k];
         if stands.len() == 1 {
@@ -117,7 +120,7 @@ impl Ground<'_> {
         }
     }
 
-    /// Which of the stands of a node is on the closest facet, or else nearest.
+    /// Which of the projections of a node is on the closest facet, or else nearest.
     fn closest_of(&self, stands: &[Stand], closest: &Stand) -> Option<usize> {
         let p = self.positions[self.nodes[closest.place]];
         let distance = |stand: &Stand| {
@@ -128,7 +131,7 @@ impl Ground<'_> {
         there.or_else(|| (0..stands.len()).min_by(|&i, &j| distance(&stands[i]).total_cmp(&distance(&stands[j]))))
     }
 
-    /// Where a node stands on a facet that goes on beyond its sides by a share of itself; none farther out.
+    /// The projection of a node onto a facet extended by a share of itself; none farther out.
     fn on_plane(&self, place: usize, facet: usize, beyond: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let (shape, foot) = self.surface.project_on_plane(facet, p, beyond, self.positions)?;

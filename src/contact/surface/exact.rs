@@ -1,28 +1,29 @@
-//! Quadrature over parts of quadrilaterals that are no parallelograms, exact where parts make up the whole.
+//! Quadrature over parts of quadrilaterals that are not parallelograms, exact in the sum over all parts.
 //!
-//! Positions in such a quadrilateral are x = x₀ + s a + t b + s t c, so that its shape functions are combinations of 1,
-//! x and s t: a rule for polynomials lacks ∫ s t dA alone, for s t is no polynomial of x. By Green's theorem that is
-//! ∮ Q dt around a part, ∂Q/∂s = s t J with J the area for the coordinates, which is linear in s and t. Along the sides
-//! of the quadrilateral Q dt is a polynomial, which Gauss' rule has exactly. Along a cut it is not, but what is wrong
-//! there the part on the other side has with the other sign: sums over all parts are exact, and so are the nodal forces
-//! of a constant pressure. Weights of the rule are changed for that by the least that leaves ∫ dA and ∫ x dA as they
-//! are.
+//! Positions in such a quadrilateral are x = x₀ + s a + t b + s t c, so that its shape functions are combinations of
+//! 1, x and s t. A polynomial rule integrates all but ∫ s t dA exactly, because s t is not a polynomial of x. By
+//! Green's theorem that integral is ∮ Q dt around a part, with ∂Q/∂s = s t J and the Jacobian J of the coordinates,
+//! which is linear in s and t. Along the sides of the quadrilateral Q dt is a polynomial, which Gauss' rule
+//! integrates exactly. Along a cut it is not, but the part on the other side of the cut has the opposite error. So
+//! sums over all parts are exact, and so are the nodal forces of a constant pressure. The weights of the rule are
+//! changed as little as possible to match the integral while ∫ dA and ∫ x dA stay.
 
 use super::overlap::Flat;
 
 /// The most points of a rule: six triangles of an octagon, twelve points each.
 const MOST: usize = 72;
 
-/// Share of the sides of a quadrilateral by which its corners may be off a parallelogram and quadrature not know.
+/// Deviation from a parallelogram, as a share of the sides, below which the rule is not corrected.
 const SKEWED: f64 = 1e-4;
 
-/// Share of a function (squared) that is left of it besides another one, below which both are one.
+/// Share of the square of a function that is left after projection, below which it counts as linearly dependent.
 const ALIKE: f64 = 1e-12;
 
-/// The most that a weight changes by, in shares of it: more is asked for by rounding alone.
+/// Largest relative change of a weight; only rounding leads to larger ones.
 const MOST_CHANGE: f64 = 0.5;
 
-/// Gauss' rule of twelve points on a line of length one (degree 23): weight, and place from the middle, to both sides.
+/// Gauss' rule of twelve points on a line of length one (degree 23): weight, and distance from the middle to either
+/// side.
 const LINE: [(f64, f64); 6] = [
     (0.023_587_668_193_255_914, 0.490_780_317_123_359_6),
     (0.053_469_662_997_659_21, 0.452_058_628_185_237_45),
@@ -32,7 +33,7 @@ const LINE: [(f64, f64); 6] = [
     (0.124_573_522_906_701_39, 0.062_616_704_255_734_46),
 ];
 
-/// A point of a rule: its weight, place, and the shape functions of both facets.
+/// A quadrature point: its weight, position, and the shape functions of both facets.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RulePoint {
     pub(super) weight: f64,
@@ -54,7 +55,7 @@ impl RulePoints {
     }
 
     pub(super) fn push(&mut self, point: RulePoint) {
-        // (There is room for all that a polygon of eight corners has.)
+        // There is room for the points of a polygon of eight corners.
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;
             self.count += 1;
@@ -65,7 +66,7 @@ impl RulePoints {
         &self.points[..self.count]
     }
 
-    /// Changes weights until ∫ s t dA of both facets is what it is around the polygon.
+    /// Changes the weights until ∫ s t dA of both facets equals its contour integral around the polygon.
     pub(super) fn correct(&mut self, [slave, master]: [&Flat; 2], polygon: &[[f64; 2]]) {
         let count = self.count;
         let points = &self.points[..count];
@@ -73,8 +74,8 @@ impl RulePoints {
         let sum = |f: &Function, g: &Function| -> f64 {
             points.iter().zip(f.iter().zip(g)).map(|(point, (f, g))| point.weight * f * g).sum()
         };
-        // Makes a function orthogonal to another one, whose square has this sum. (Values behind the last point are not
-        // read.)
+        // Makes a function orthogonal to another one with this sum of squares. Values behind the last point are not
+        // read.
         let leave_out = |function: &mut Function, other: &Function, square: f64| {
             if square > 0.0 {
                 let share = sum(function, other) / square;
@@ -86,7 +87,7 @@ impl RulePoints {
             function.iter_mut().zip(points).for_each(|(x, point)| *x = value(point));
             function
         };
-        // What must stay, orthogonal to each other; then what is missing.
+        // The functions whose integrals must stay, made orthogonal; then the missing integrals.
         let one = of(&|_| 1.0);
         let mut kept = [one, of(&|point| point.at[0] - first[0]), of(&|point| point.at[1] - first[1])];
         let mut squares = [0.0; 3];
@@ -98,11 +99,12 @@ impl RulePoints {
         let mut factors: Function = [1.0; MOST];
         let mut before: Option<(Function, f64, f64)> = None;
         for (flat, product) in [(slave, of(&|point| point.slave[2])), (master, of(&|point| point.master[2]))] {
-            // (Shape functions of a triangle are linear.)
+            // Shape functions of a triangle are linear.
             if flat.count < 4 {
                 continue;
             }
-            // Of a parallelogram s t is a polynomial: nothing is missing, and nothing may be once weights have changed.
+            // On a parallelogram s t is a polynomial, which the rule integrates exactly. The new weights must keep
+            // that.
             let mut missing = match flat.is_skewed() {
                 true => flat.integral_of_product(polygon) - sum(&product, &one),
                 false => 0.0,
@@ -133,21 +135,21 @@ fn cross([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
 }
 
 impl Flat {
-    /// Whether it is a quadrilateral, and no parallelogram.
+    /// Whether it is a quadrilateral that is not a parallelogram.
     pub(super) fn is_skewed(&self) -> bool {
         let [a, b, c] = self.sides();
         let size = |x: [f64; 2]| x[0].hypot(x[1]);
         self.count == 4 && size(c) > SKEWED * size(a).max(size(b))
     }
 
-    /// a, b and c of a quadrilateral.
+    /// The vectors a, b and c of a quadrilateral.
     fn sides(&self) -> [[f64; 2]; 3] {
         let from = |k: usize| -> [f64; 2] { std::array::from_fn(|i| self.corners[k][i] - self.corners[0][i]) };
         let (a, b) = (from(1), from(3));
         [a, b, std::array::from_fn(|i| from(2)[i] - a[i] - b[i])]
     }
 
-    /// ∫ s t dA over a polygon, counterclockwise, but for what the parts beyond its sides have with the other sign.
+    /// ∫ s t dA over a counterclockwise polygon, up to errors along cuts, which cancel in the sum over all parts.
     fn integral_of_product(&self, polygon: &[[f64; 2]]) -> f64 {
         let [a, b, c] = self.sides();
         let (constant, by_s, by_t) = (cross(a, b), cross(a, c), cross(c, b));

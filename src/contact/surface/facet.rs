@@ -1,13 +1,13 @@
-//! A facet by the numbers of its nodes.
+//! A facet, given by the indices of its nodes.
 
 use super::middle;
 use super::second_order::{ByNode, Kind, Whole};
 use super::shape::{Point, Shape, add_scaled, sub};
 
-/// A facet of a surface: the numbers of its 2, 3 or 4 nodes.
+/// A facet of a surface: the indices of its 2, 3 or 4 nodes.
 ///
-/// Its normal points out of the body: a segment (two dimensions) is walked with the body on the left, a triangle or a
-/// bilinear quadrilateral (three dimensions) goes counter-clockwise if seen from outside.
+/// Its normal points out of the body. A segment (two dimensions) runs with the body on its left; the nodes of a
+/// triangle or a bilinear quadrilateral (three dimensions) are in counter-clockwise order seen from outside.
 ///
 /// ```
 /// use contact_dynamics::contact::Facet;
@@ -16,10 +16,10 @@ use super::shape::{Point, Shape, add_scaled, sub};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facet {
-    /// The nodes; of less than four the last one fills the rest.
+    /// The nodes; if there are fewer than four, the last one fills the rest.
     pub(crate) nodes: [usize; 4],
     pub(crate) count: usize,
-    /// The facet of second order that it is a part of.
+    /// The facet of second order whose part it is.
     pub(crate) whole: Option<Whole>,
 }
 
@@ -41,9 +41,9 @@ impl From<[usize; 4]> for Facet {
     }
 }
 
-/// Facets of second order are several of first order with the same nodes, which know of what they are parts:
-/// [`Mortar`](crate::contact::Mortar) and [`Tie`](crate::contact::Tie) take positions between nodes from the shape
-/// functions of second order, other constraints from the parts.
+/// A facet of second order is a set of facets of first order with the same nodes, each linked to the whole.
+/// [`Mortar`](crate::contact::Mortar) and [`Tie`](crate::contact::Tie) interpolate positions with the shape functions
+/// of second order; other constraints use the linear parts.
 ///
 /// ```
 /// use contact_dynamics::contact::Facet;
@@ -94,19 +94,19 @@ impl Facet {
         Shape::new([positions[a], positions[b], positions[c], positions[d]], self.count)
     }
 
-    /// The outward unit normal in its middle; none if it is degenerate there.
+    /// The outward unit normal at its middle; none if it is degenerate there.
     #[inline]
     pub(crate) fn normal(&self, positions: &[Point]) -> Option<Point> {
         self.shape(positions).normal(&middle(self.count))
     }
 
-    /// Its nodes, and behind them those that the facet of second order has besides.
+    /// Its nodes, followed by the other nodes of its facet of second order.
     pub(crate) fn all_nodes(&self) -> impl Iterator<Item = usize> + '_ {
         let others = self.whole.as_ref().map_or(&[][..], Whole::others);
         self.nodes().iter().chain(others).copied()
     }
 
-    /// The shape functions that positions follow, by all its nodes, where its own are `weights`.
+    /// The shape functions of the positions, by all its nodes, where its own shape functions are `weights`.
     pub(crate) fn shapes(&self, weights: &[f64; 4]) -> ByNode {
         self.whole.map_or_else(
             || std::array::from_fn(|k| weights.get(k).copied().unwrap_or(0.0)),

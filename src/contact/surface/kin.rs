@@ -1,28 +1,29 @@
-//! What nodes of a surface do not meet of their own surface: the facets around them.
+//! Facets of the same surface that a node cannot be in contact with: the facets around it.
 
 use super::Surface;
 use super::search::Neighborhood;
 
-/// Cosine of the angle between the normals of a node and a facet beside it up to which they face each other (102°):
-/// across a convex edge of a right angle they do not.
+/// Largest cosine between the normals of a node and of a facet beside it at which they face each other (an angle of
+/// 102°). Across a convex right angle they do not face each other.
 pub(crate) const FACING: f64 = -0.2;
 
-/// By place of the node among those of the surface.
+/// Lists by place of the node in the surface.
 #[derive(Debug)]
 pub(crate) struct Kin {
     /// The facets within some rings around each node.
     own: Neighborhood,
-    /// The facets that are near each node in the reference configuration.
+    /// The facets near each node in the reference configuration.
     beside: Neighborhood,
 }
 
 impl Kin {
-    /// Finds the facets within `rings` of each node (none: those that have it); those `beside` it are given.
+    /// Finds the facets within `rings` of each node (zero: the facets that have the node); those `beside` it are
+    /// given.
     pub(crate) fn new(surface: &Surface, rings: usize, beside: Neighborhood) -> Self {
         Self { own: around(surface, rings), beside }
     }
 
-    /// Whether a node never meets a facet.
+    /// Whether a node is never in contact with a facet.
     pub(crate) fn keeps_apart(&self, place: usize, facet: usize) -> bool {
         self.own.holds(place, facet)
     }
@@ -33,7 +34,7 @@ impl Kin {
     }
 }
 
-/// The facets within some rings around each node: those that have it first.
+/// The facets within `rings` rings around each node; ring zero are the facets that have the node.
 fn around(surface: &Surface, rings: usize) -> Neighborhood {
     let lists = surface.nodes().iter().map(|&node| {
         let mut own: Vec<usize> = surface.facets_around(node).collect();

@@ -1,34 +1,34 @@
-//! The material behind the nodes and facets of a surface: how deep in contact a point may be behind a facet.
+//! The material behind the nodes and facets of a surface: how deep behind a facet a point can be in contact with it.
 //!
-//! A point x of one body that is d behind a facet of another one is in contact with it only if the bodies are in each
-//! other there. Bodies that are apart have all of their material between x and the facet: d ≥ t₁ + t₂, with their
-//! thicknesses t₁ behind x and t₂ behind the facet. A facet of the same body is the other side of its wall: d = t₁.
-//! So contact ends at half of the material that may lie between, in the reference configuration: (t₁ + t₂)/2 between
-//! two bodies, t₁/2 within one. The other half is the margin for bodies that deform.
+//! A point x of one body that is at depth d behind a facet of another body is in contact only if the bodies penetrate
+//! each other there. If they do not, all of their material lies between x and the facet: d ≥ t₁ + t₂, with the
+//! thicknesses t₁ behind x and t₂ behind the facet. A facet of the same body is the other side of the wall: d = t₁.
+//! So contact ends at half of this material in the reference configuration: at (t₁ + t₂)/2 between two bodies, at
+//! t₁/2 within one. The other half is the margin for deformation.
 
 use super::Surface;
 use super::search::{Bounds, Neighborhood};
 use super::shape::{Point, dot};
 
-/// Greatest cosine between the normal of a node and that of a facet behind it that bounds the material there: sides
-/// across a right angle do, for they face the node once the body bends.
+/// Largest cosine between the normal of a node and the normal of a facet that bounds the material behind it. Sides
+/// across a right angle count, because they face the node once the body bends.
 const INSIDE: f64 = 0.5;
 
-/// Share of the material that may lie between a point and a facet behind which it is in contact.
+/// Share of the material between a point and a facet up to which the point is in contact.
 const DEPTH: f64 = 0.5;
 
-/// How far, in shares of the reach or of a facet, whichever is longer, the material is looked at.
+/// Range in which the thickness is measured, in multiples of the reach or of a typical facet, whichever is longer.
 const RANGE: f64 = 2.0;
 
-/// Shares of a depth that are rounding.
+/// Relative rounding of a depth.
 const ROUNDING: f64 = 1e-6;
 
-/// Which facets belong to one body, and how deep contact may be behind each node for the material there.
+/// The body of each facet, and the largest depth of contact from the material behind each node.
 #[derive(Debug)]
 pub(crate) struct Material {
     /// The body of each facet.
     bodies: Vec<usize>,
-    /// By place of the node among those of the surface.
+    /// Largest depth of contact, by place of the node in the surface.
     depths: Vec<f64>,
 }
 
@@ -41,13 +41,14 @@ pub(super) fn near(surface: &Surface, positions: &[Point], reach: f64) -> Neighb
 }
 
 impl Material {
-    /// As [`new`](Self::new), of the facets that are near.
+    /// As [`new`](Self::new), with the facets within range.
     pub(crate) fn of(surface: &Surface, positions: &[Point], known: (f64, f64)) -> Self {
         Self::new(surface, &near(surface, positions, known.0), positions, known)
     }
 
-    /// Measures the thickness by the closest facet of the same body that a node is behind of, of those `near` it. No
-    /// body may be inside of itself, but by the `overlap` of surfaces with negative offsets.
+    /// Measures the thickness at a node as its distance to the closest facet of the same body that it is behind, of
+    /// the facets `near` it. A body must not penetrate itself by more than the `overlap` of surfaces with negative
+    /// offsets.
     pub(super) fn new(
         surface: &Surface,
         near: &Neighborhood,
@@ -64,7 +65,7 @@ impl Material {
                 let projected = surface.project(facet, positions[node], positions)?;
                 let (shape, foot) = &projected;
                 let normal = shape.normal(&foot.weights).filter(|normal| dot(own, *normal) <= INSIDE);
-                // (Beside a side or a vertex a node may be behind the plane of a facet, and outside.)
+                // Beside a side or a vertex a node may be behind the plane of a facet and still outside the body.
                 let counts = (ROUNDING, &|_| true);
                 let (_, height) = surface.direction(facet, positions[node], &projected, counts, positions)?;
                 let is_behind = height < 0.0 && foot.distance > (1.0 + ROUNDING) * overlap;
@@ -81,12 +82,12 @@ impl Material {
         self.bodies[first_facet(surface, place)] == self.bodies[facet]
     }
 
-    /// How deep contact may be for the material behind the node at a place of the surface.
+    /// The largest depth of contact from the material behind the node at a place of the surface.
     pub(crate) fn behind(&self, place: usize) -> f64 {
         self.depths[place]
     }
 
-    /// The same behind a facet.
+    /// As [`behind`](Self::behind), for a facet: the least of its nodes.
     pub(crate) fn behind_facet(&self, surface: &Surface, facet: usize) -> f64 {
         let places = &surface.places(facet)[..surface.facets()[facet].nodes().len()];
         places.iter().map(|&place| self.depths[place]).fold(f64::INFINITY, f64::min)

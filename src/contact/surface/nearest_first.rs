@@ -1,21 +1,20 @@
-//! Lists of the facets near each node, the nearest first, so that a node looks at few of them.
+//! Lists of the facets near each node, nearest first, so that the search for the closest facet ends early.
 
 use super::reach::Reach;
 use super::search::{Bounds, each_near, overhang_of};
 use super::shape::Point;
 
-/// For each node of a list the facets near it, and how far their boxes were from it, ascending, when the lists were
-/// built.
+/// For each node of a list the facets near it, and the distances of their boxes when the lists were built, ascending.
 #[derive(Debug, Default)]
 pub(crate) struct NearestFirst {
     starts: Vec<usize>,
     entries: Vec<(f64, usize)>,
-    /// The longest side of the boxes then.
+    /// The longest side of the boxes when the lists were built.
     extent: f64,
 }
 
 impl NearestFirst {
-    /// Lists anew the facets within `range` of each node, by their boxes.
+    /// Rebuilds the lists of the facets whose boxes are within `range` of each node.
     pub(crate) fn build(&mut self, nodes: &[usize], positions: &[Point], boxes: &[Bounds], range: f64) {
         let Self { starts, entries, extent } = self;
         starts.clear();
@@ -33,7 +32,7 @@ impl NearestFirst {
         });
     }
 
-    /// What is near the k-th node: distances that boxes had then, and facets.
+    /// The list of the k-th node: distances of boxes when the lists were built, and facets.
     pub(crate) fn of(&self, k: usize) -> &[(f64, usize)] {
         match self.starts.get(k..k + 2) {
             Some(range) => &self.entries[range[0]..range[1]],
@@ -42,19 +41,19 @@ impl NearestFirst {
     }
 }
 
-/// What tells how near facets may have come since lists were built.
+/// Data that bound how far facets have approached since the lists were built.
 #[derive(Clone, Copy)]
 pub(crate) struct Kept<'a> {
     pub(crate) reach: &'a Reach,
-    /// The box of the motions of the facets' nodes since.
+    /// The box of the motions of the facets' nodes since the lists were built.
     pub(crate) motion: Bounds,
     /// A bound of the sum of offsets of a node and a facet.
     pub(crate) thick: f64,
 }
 
 impl Kept<'_> {
-    /// A bound of how much nearer to a node the surface on a facet may be than the box of the facet was: by motions, by
-    /// offsets, and because facets go on a little beyond the rim.
+    /// A bound of how much nearer to a node the surface of a facet may be than the listed distance of its box: by
+    /// motions, by offsets, and by the extension of facets beyond the rim.
     pub(super) fn slack(&self, lists: &NearestFirst, node: usize, position: Point) -> f64 {
         let stretched = lists.extent + self.motion.extent();
         self.reach.moved(node, position, &self.motion) + self.thick + overhang_of(stretched)

@@ -1,4 +1,4 @@
-//! The nodes of surfaces: where they are, and which dofs move them.
+//! The nodes of surfaces: their positions, and the dofs that move them.
 
 use super::search::Bounds;
 use super::shape::{Point, add_scaled, sub};
@@ -9,7 +9,8 @@ use crate::contact::{check_coordinates, check_mesh};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Coordinates in two or three dimensions as points in space; refuses others, and what is not a number.
+/// Coordinates in two or three dimensions as points in space. Rejects other dimensions and values that are not
+/// finite.
 pub(crate) fn points<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<Vec<Point>> {
     if D != 2 && D != 3 {
         return Err(Error::Dimension { what: "a point of a contact surface", expected: 3, found: D });
@@ -19,7 +20,7 @@ pub(crate) fn points<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<
     Ok(coordinates.iter().map(|x| std::array::from_fn(|i| component(x, i))).collect())
 }
 
-/// The nodes of a mesh, some of which two surfaces read.
+/// The nodes of a mesh that two surfaces share.
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     pub(crate) dimension: usize,
@@ -27,14 +28,14 @@ pub(crate) struct Nodes {
     pub(crate) coordinates: Vec<Point>,
     /// Dofs of the displacement in the system, by node; the first `dimension` count.
     system_dofs: Vec<[usize; 3]>,
-    /// Their places in the list of the constraint, for nodes of the two bodies.
+    /// Places of these dofs in the list of the constraint, for the nodes of the two bodies.
     places: Vec<[usize; 3]>,
     list: DofList,
-    /// Nodes of the two bodies: the same list twice of a body that meets itself.
+    /// Nodes of the two bodies. A body in contact with itself is listed twice.
     bodies: [Vec<usize>; 2],
-    /// Where the nodes of the two bodies are now.
+    /// The current positions of the nodes of the two bodies.
     pub(crate) positions: Vec<Point>,
-    /// How often they have been moved: as long as this is the same, so are the positions.
+    /// Number of changes of the positions: while it is the same, so are the positions.
     moves: usize,
 }
 
@@ -55,7 +56,7 @@ impl Nodes {
         })
     }
 
-    /// Nodes of a mesh with two surfaces of it, of two bodies whose nodes are those that move the surfaces.
+    /// Nodes of a mesh, and two surfaces of it. The bodies are the nodes that move the surfaces.
     pub(crate) fn with_surfaces<T: Real, F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -69,7 +70,7 @@ impl Nodes {
         Ok((nodes, [one, other]))
     }
 
-    /// Takes the dofs of two bodies into the list of the constraint; refuses bodies that share a node (each sorted).
+    /// Lists the dofs of two bodies (sorted nodes) in the constraint. Rejects bodies that share a node.
     pub(crate) fn read_bodies(&mut self, bodies: [Vec<usize>; 2]) -> Result<()> {
         let [one, other] = &bodies;
         if let Some(node) = one.iter().find(|node| other.binary_search(node).is_ok()) {
@@ -81,7 +82,7 @@ impl Nodes {
         Ok(())
     }
 
-    /// Takes the dofs of one body, which is the other one too.
+    /// Lists the dofs of one body, which is in contact with itself.
     pub(crate) fn read_body(&mut self, body: Vec<usize>) {
         self.bodies = [body.clone(), body];
         self.list_dofs();
@@ -107,7 +108,7 @@ impl Nodes {
         self.list.as_slice()
     }
 
-    /// The places of a node's dofs among them.
+    /// The places of a node's dofs in [`dofs`](Self::dofs).
     pub(crate) fn places(&self, node: usize) -> &[usize] {
         &self.places[node][..self.dimension]
     }
@@ -121,7 +122,7 @@ impl Nodes {
         vector
     }
 
-    /// Orthonormal directions across a normal: one in the plane, two in space.
+    /// Orthonormal tangents to a normal: one in two dimensions, two in three.
     pub(crate) fn tangents(&self, normal: Point) -> impl Iterator<Item = Point> + use<> {
         let [x, y, _] = normal;
         let directions = match self.dimension {
@@ -131,17 +132,17 @@ impl Nodes {
         directions.into_iter().take(self.dimension - 1)
     }
 
-    /// The way of a node between two displacements.
+    /// The displacement of a node from the first displacements to the second.
     pub(crate) fn way<T: Real>(&self, node: usize, u: [&[T]; 2]) -> Point {
         sub(self.vector(node, u[1]), self.vector(node, u[0]))
     }
 
-    /// The boxes of a vector of the nodes of either body: of their velocities, of their ways.
+    /// The bounding boxes of a nodal vector, for instance a velocity, over each of the two bodies.
     pub(crate) fn boxes_of(&self, vector: impl Fn(usize) -> Point) -> [Bounds; 2] {
         self.bodies.each_ref().map(|body| Bounds::of_points(body.iter().map(|&node| vector(node))))
     }
 
-    /// Puts the places of the nodes of both bodies with displacements u into a list by node.
+    /// Writes the positions of the nodes of both bodies with displacements u into a list by node.
     pub(crate) fn places_at<T: Real>(&self, u: &[T], positions: &mut Vec<Point>) {
         positions.resize(self.coordinates.len(), [0.0; 3]);
         for &node in self.bodies.iter().flatten() {
@@ -149,7 +150,7 @@ impl Nodes {
         }
     }
 
-    /// Moves the nodes of both bodies to where they are with displacements u; returns the boxes of the bodies.
+    /// Moves the nodes of both bodies to their positions with displacements u; returns the boxes of the bodies.
     pub(crate) fn move_to<T: Real>(&mut self, u: &[T]) -> Result<[Bounds; 2]> {
         let Self { dimension, coordinates, system_dofs, places, positions, bodies, moves, .. } = self;
         let (mut boxes, mut moved) = ([Bounds::EMPTY; 2], false);
@@ -173,7 +174,7 @@ impl Nodes {
         Ok(boxes)
     }
 
-    /// How often [`move_to`](Self::move_to) has moved a node.
+    /// How many calls of [`move_to`](Self::move_to) have changed a position.
     pub(crate) fn moves(&self) -> usize {
         self.moves
     }

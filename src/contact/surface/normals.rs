@@ -1,10 +1,11 @@
-//! Normals at sides and vertices of a surface, and the direction along which a node stands on it.
+//! Normals at sides and vertices of a surface, and the direction of the gap of a node.
 
 use super::Surface;
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub, unit};
 
 impl Surface {
-    /// Sum of the normals on both sides of a side, at its share `s`; of that beyond it only if it `counts`.
+    /// Normalized sum of the normals on both sides of a side, at its share `s`. The far one is added only if it
+    /// `counts`.
     fn side_normal(
         &self,
         facet: usize,
@@ -25,7 +26,7 @@ impl Surface {
         self.node_normal_of(node, &|_| true, positions)
     }
 
-    /// The same of those that `count`.
+    /// As [`node_normal`](Self::node_normal), with the normals that satisfy `counts`.
     fn node_normal_of(&self, node: usize, counts: &impl Fn(Point) -> bool, positions: &[Point]) -> Option<Point> {
         let sum = self.corners_around(node).fold([0.0; 3], |sum, (facet, k)| {
             let shape = self.facets[facet].shape(positions);
@@ -39,8 +40,8 @@ impl Surface {
         unit(sum)
     }
 
-    /// How steeply the sides around a node rise above the plane across its mean normal: the mean of the sines, below
-    /// zero at a convex corner, above in a dent.
+    /// How steeply the sides around a node rise above the plane normal to its mean normal: the mean of the sines,
+    /// negative at a convex corner, positive in a dent.
     pub(crate) fn rise(&self, node: usize, positions: &[Point]) -> f64 {
         let Some(normal) = self.node_normal(node, positions) else { return 0.0 };
         let at = positions[node];
@@ -56,7 +57,7 @@ impl Surface {
         if mean.1 > 0.0 { mean.0 / mean.1 } else { 0.0 }
     }
 
-    /// The side or vertex that a point of a facet lies on, up to `share` of the facet.
+    /// The side or vertex within `share` of the facet from one of its points.
     fn near(&self, facet: usize, shape: &Shape, foot: &Foot, share: f64) -> Location {
         let (count, rim) = (self.facets[facet].nodes().len(), &self.rims[facet]);
         let close = |k: usize| shape.inset(&foot.weights, k) <= share;
@@ -77,11 +78,11 @@ impl Surface {
         found
     }
 
-    /// Whether a point at this way from a side or a vertex of a facet is in front of a facet there that the others lie
-    /// behind of: it is outside then, on whichever side of the mean normal. (The facets whose closest points are nearer
-    /// may be none that its node meets.)
+    /// Whether a point at `arm` from a side or a vertex of a facet is in front of one of the facets there, while the
+    /// others lie behind that facet. Then the point is outside even if it is behind the mean normal. Such points
+    /// occur because facets with nearer closest points may be excluded for the node.
     fn is_outside(&self, facet: usize, location: Location, arm: Point, positions: &[Point]) -> bool {
-        /// Share of a facet that a point is in front of one: edges that are flush, to a little, are those of one
+        /// Least height of the point in front of the facet, as a share of the facet. Nearly flush edges count as one
         /// surface.
         const FLUSH: f64 = 0.02;
         const ROUNDING: f64 = 1e-9;
@@ -107,13 +108,13 @@ impl Surface {
         })
     }
 
-    /// The normal along which a node at p stands on a facet, and its signed distance along it.
+    /// The normal of the gap between a facet and a node at p, and the signed distance along it.
     ///
-    /// Inside of a facet, the facet's own normal. On a side or a vertex the direction from the foot to the node, or
-    /// away from it if the node is behind the mean normal of the facets there (the sign is right on any surface that
-    /// does not intersect itself: Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49); closer than `share` of the
-    /// facet, where that direction is lost in rounding, the mean normal itself, of those that the node `meets`: a
-    /// corner upon a corner of a body below is above it, not beside it.
+    /// Inside of a facet it is the facet's own normal. On a side or a vertex it is the direction from the foot to the
+    /// node, reversed if the node is behind the mean normal of the facets there. The sign is right on any surface
+    /// that does not intersect itself (Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49). Closer than `share` of
+    /// the facet, where rounding hides that direction, it is the mean of the normals that the node `meets`. So a
+    /// corner on a corner of a body below is above it, not beside it.
     pub(crate) fn direction(
         &self,
         facet: usize,

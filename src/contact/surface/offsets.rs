@@ -1,11 +1,11 @@
-//! Surfaces that lie outside of their facets, as those of shells and coatings do, by amounts that time may change.
+//! Offsets of surfaces from their facets, as for shells and coatings, with a factor that may change in time.
 
 use super::Facet;
 use super::ramp::Ramp;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Offsets by node of a mesh, in full size, and the factor that time gives them. A list of none is zero.
+/// Offsets by node of a mesh, at full size, and their factor in time. An empty list means zero.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Thickness {
     by_node: Vec<f64>,
@@ -13,7 +13,7 @@ pub(crate) struct Thickness {
 }
 
 impl Thickness {
-    /// Takes one offset a node; refuses lists of another length, and what is not finite.
+    /// Sets one offset per node. Rejects lists of another length and values that are not finite.
     pub(crate) fn set<T: Real>(&mut self, offsets: &[T], nodes: usize) -> Result<()> {
         let (expected, found) = (nodes, offsets.len());
         if found != expected {
@@ -36,8 +36,8 @@ impl Thickness {
         Offsets { by_node: &self.by_node, factor: self.ramp.at(t) }
     }
 
-    /// Bounds of the sum of the offsets of a node of one body and of one of the other, below and above zero, where
-    /// their factor is this.
+    /// Lower bound (≤ 0) and upper bound (≥ 0) of the sum of the offsets of a node of one body and a node of the
+    /// other, with this factor.
     pub(crate) fn bounds(&self, bodies: &[Vec<usize>; 2], factor: f64) -> [f64; 2] {
         if self.is_none() {
             return [0.0; 2];
@@ -50,20 +50,20 @@ impl Thickness {
         [(one[0] + other[0]).min(0.0), (one[1] + other[1]).max(0.0)]
     }
 
-    /// A bound of the size of that sum at the two times between which it lies, and of its change.
+    /// Bounds of the absolute value of that sum between two times, and of its change between them.
     pub(crate) fn sizes(&self, bodies: &[Vec<usize>; 2], times: [f64; 2]) -> [f64; 2] {
         let size = |factor: f64| self.bounds(bodies, factor).into_iter().fold(0.0, |most, x| f64::max(most, x.abs()));
         let [before, after] = times.map(|t| self.ramp.at(t));
         [size(before).max(size(after)), size(after - before)]
     }
 
-    /// How deep one surface lies in the other, at any time, where they just touch.
+    /// The largest penetration, at any time, of the facets of two surfaces that just touch.
     pub(crate) fn overlap(&self, bodies: &[Vec<usize>; 2]) -> f64 {
         self.ramp.factors().map(|factor| -self.bounds(bodies, factor)[0]).into_iter().fold(0.0, f64::max)
     }
 }
 
-/// How far surfaces lie outside of their facets: by node, times a factor. A list of none is zero.
+/// Offsets of surfaces from their facets: by node, times a factor. An empty list means zero.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Offsets<'a> {
     pub(crate) by_node: &'a [f64],
@@ -75,17 +75,17 @@ impl Offsets<'_> {
         self.by_node.is_empty()
     }
 
-    /// That of a node, without the factor.
+    /// The offset of a node, without the factor.
     pub(crate) fn of(&self, node: usize) -> f64 {
         self.by_node.get(node).copied().unwrap_or(0.0)
     }
 
-    /// Those at the corners of a facet, without the factor.
+    /// The offsets at the corners of a facet, without the factor.
     pub(crate) fn at_corners(&self, facet: &Facet) -> [f64; 4] {
         facet.nodes.map(|node| self.of(node))
     }
 
-    /// The sum of that of a node and of that of a facet where the shape functions are these, without the factor.
+    /// The offset of a node plus that of a facet at the point with these shape functions, without the factor.
     pub(crate) fn upon(&self, node: usize, facet: &Facet, weights: &[f64; 4]) -> f64 {
         if self.is_none() {
             return 0.0;
@@ -94,7 +94,7 @@ impl Offsets<'_> {
         self.of(node) + weights.iter().zip(corners).map(|(weight, offset)| weight * offset).sum::<f64>()
     }
 
-    /// A bound of the size of that sum, with the factor.
+    /// A bound of the absolute value of that sum, with the factor.
     pub(crate) fn most(&self, node: usize, facet: &Facet) -> f64 {
         let corners = self.at_corners(facet);
         let [low, high] =

@@ -1,4 +1,4 @@
-//! The outer sides of a mesh of cells: sides that belong to one cell alone, turned outward.
+//! The outer sides of a mesh of cells: sides of exactly one cell, oriented outward.
 
 use super::nodes::points;
 use super::shape::{Point, add_scaled, cross, dot, norm, sub};
@@ -7,8 +7,8 @@ use crate::contact::check_nodes;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Sides of cells by their corners, outward where corners are numbered in the usual way: of a triangle or quadrilateral
-/// counter-clockwise, of the others with the first face seen from inside counter-clockwise.
+/// Sides of cells by their corners, with outward normals for the usual numbering of corners: counter-clockwise for
+/// triangles and quadrilaterals, and the first face counter-clockwise seen from inside for the other cells.
 type Sides = &'static [&'static [usize]];
 
 const TRIANGLE: Sides = &[&[0, 1], &[1, 2], &[2, 0]];
@@ -32,15 +32,14 @@ fn kind(dimension: usize, nodes: usize) -> Option<(usize, Sides, bool)> {
 }
 
 impl Surface {
-    /// The outer sides of a mesh: the sides of its cells that no other cell has, with normals that point out of the
-    /// cells. `coordinates` are the reference coordinates of all nodes.
+    /// The outer sides of a mesh: the sides that belong to one cell only, with normals out of the cell. `coordinates`
+    /// are the reference coordinates of all nodes.
     ///
-    /// A cell is the list of its nodes, corners first, as finite-element codes and mesh formats have them. Its number
-    /// of nodes tells what it is: in two dimensions a triangle (3, 6) or a quadrilateral (4, 8, 9), in three a
-    /// tetrahedron (4, 10), a pyramid (5, 13, 14), a wedge (6, 15, 18) or a hexahedron (8, 20, 27). Cells may be
-    /// numbered either way around. The nodes of a cell of second order that are no corners may come in any order: on
-    /// each side those are taken that are closest to its middle and to the middles of its edges; such a side becomes
-    /// several facets.
+    /// A cell is the list of its nodes, corners first, as in finite-element codes and mesh formats. Its number of
+    /// nodes determines its type: in two dimensions a triangle (3, 6) or a quadrilateral (4, 8, 9), in three a
+    /// tetrahedron (4, 10), a pyramid (5, 13, 14), a wedge (6, 15, 18) or a hexahedron (8, 20, 27). Cells may have
+    /// either orientation. The nodes of a cell of second order behind its corners may be in any order: each side gets
+    /// the nodes closest to its middle and to the middles of its edges. Such a side becomes several facets.
     ///
     /// ```
     /// use contact_dynamics::contact::Surface;
@@ -56,8 +55,8 @@ impl Surface {
     ///
     /// # Errors
     ///
-    /// Those of [`new`](Self::new); [`Error::Incompatible`] for a cell with another number of nodes or without volume,
-    /// for a side of three cells and for a node in the middle that two edges of a side would have.
+    /// Those of [`new`](Self::new); [`Error::Incompatible`] for a cell with another number of nodes or without
+    /// volume, for a side shared by three cells, and if one node is closest to the middles of two edges of a side.
     pub fn of_cells<T: Real, C: AsRef<[usize]>, const D: usize>(
         coordinates: &[[T; D]],
         cells: impl IntoIterator<Item = C>,
@@ -104,7 +103,7 @@ fn middle_of(nodes: &[usize], coordinates: &[Point]) -> Point {
     sum.map(|x| x / nodes.len() as f64)
 }
 
-/// A cell whose number of nodes is known.
+/// A cell of known type.
 struct Cell<'c> {
     index: usize,
     nodes: &'c [usize],
@@ -112,7 +111,7 @@ struct Cell<'c> {
     sides: Sides,
     /// Whether its quadrilateral sides have a node in the middle.
     centered: bool,
-    /// Whether it is numbered the other way around.
+    /// Whether its corners are in the reverse order.
     turned: bool,
 }
 
@@ -139,7 +138,7 @@ impl<'c> Cell<'c> {
         corners.iter().map(|&corner| self.nodes[corner]).collect()
     }
 
-    /// Its volume (area in two dimensions) with straight edges; negative if it is numbered the other way around.
+    /// Its volume (area in two dimensions) with straight edges; negative if its corners are in the reverse order.
     fn volume(&self, coordinates: &[Point]) -> Result<f64> {
         const SMALL: f64 = 1e-12;
         let corners = &self.nodes[..self.corners];
@@ -166,14 +165,14 @@ impl<'c> Cell<'c> {
         }
     }
 
-    /// The node besides the corners that is closest to the middle of some nodes; none if there are corners alone.
+    /// The node that is no corner and is closest to the middle of the given nodes; none if there are only corners.
     fn between(&self, nodes: &[usize], coordinates: &[Point]) -> Option<usize> {
         let middle = middle_of(nodes, coordinates);
         let distance = |node: usize| norm(sub(coordinates[node], middle));
         self.nodes[self.corners..].iter().copied().min_by(|&x, &y| distance(x).total_cmp(&distance(y)))
     }
 
-    /// Appends the facets that one of its sides is made of.
+    /// Appends the facets of one of its sides.
     fn push_facets(&self, side: usize, coordinates: &[Point], facets: &mut Vec<Facet>) -> Result<()> {
         let mut corners = self.at(self.sides[side]);
         if self.turned {
@@ -204,7 +203,7 @@ impl<'c> Cell<'c> {
             [a, b, c, d, e, f, g, h, i] => {
                 facets.extend(Facet::of_biquadratic_quadrilateral([a, b, c, d, e, f, g, h, i]));
             }
-            // (No side of a cell has another number of nodes.)
+            // No side of a cell has another number of nodes.
             _ => {}
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! What a surface has for output: areas and normals of its nodes, and the pressure that forces on them make.
+//! Output of a surface: areas and normals of its nodes, and the pressures and shear stresses from nodal forces.
 
 use super::nodes::points;
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm};
@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl Surface {
-    /// ∫ N dA of each of its [`nodes`](Self::nodes) (area; length in two dimensions), N the shape function of the node:
-    /// the share of the surface that belongs to it; on facets of second order that of their linear parts. `positions`
-    /// are those of all nodes of the mesh.
+    /// The tributary area ∫ N dA of each of its [`nodes`](Self::nodes) (a length in two dimensions), with the shape
+    /// function N of the node. On facets of second order, N is the shape function of the linear parts. `positions`
+    /// holds the positions of all nodes of the mesh.
     ///
     /// # Errors
     ///
@@ -27,8 +27,8 @@ impl Surface {
         areas
     }
 
-    /// The outward normal at each of its [`nodes`](Self::nodes): the mean of those of the facets around it, with their
-    /// angles there as weights, and length one (zero where facets cancel each other).
+    /// The outward unit normal at each of its [`nodes`](Self::nodes): the mean of the normals of the facets around
+    /// it, weighted by their angles at the node. It is zero where the normals cancel.
     ///
     /// # Errors
     ///
@@ -39,18 +39,20 @@ impl Surface {
         Ok(self.nodes.iter().map(normal).map(|normal| std::array::from_fn(|axis| T::of(normal[axis]))).collect())
     }
 
-    /// The pressure (force/area, compression positive) on each of its [`nodes`](Self::nodes) that forces make:
-    /// −f·A/|A|² with A = ∫ N n dA, n outward, of the face that the node is on; what it leaves of the force is
-    /// [`shears`](Self::shears). A face is what facets make that meet at less than 37°. At edges and corners those faces
-    /// count that have a facet there all of whose nodes bear a force (if none has, all), and pressures p_k ≥ 0 on them
-    /// make up the force best, f ≈ −Σ p_k A_k: that of the face that bears most is the node's. So the pressure on one
-    /// side of a body is that of its rim and corners too, and a pressure that is the same all over a body comes out as
-    /// it is. On facets of second order, whose nodes in the middle bear most of a pressure, f is what their linear parts
-    /// would have of it.
+    /// The pressure (force/area, compression positive) at each of its [`nodes`](Self::nodes) from the given forces:
+    /// −f·A/|A|² with A = ∫ N n dA over the face at the node, n outward. [`shears`](Self::shears) returns the rest of
+    /// the force. A face is a set of facets around the node whose normals differ by less than 37°.
     ///
-    /// `positions` and `forces` are those of all nodes of the mesh: contact forces are those of
-    /// [`contact_forces`](crate::Simulation::contact_forces). At the border of a contact that ends inside of a facet
-    /// the area of a node is larger than what is pressed; [`Mortar::area`](crate::contact::Mortar::area) knows better.
+    /// An edge or corner has several faces. Only faces that have a facet all of whose nodes bear a force count;
+    /// without any such facet, all faces count. Pressures p_k ≥ 0 on them are fitted to the force, f ≈ −Σ p_k A_k,
+    /// and the node gets the pressure of the face with the largest force. So the pressure on one side of a body holds
+    /// at its rim and corners too, and a pressure that is uniform all over a body is reproduced. On facets of second
+    /// order the nodes in the middle bear most of a pressure; there f is redistributed to the linear parts first.
+    ///
+    /// `positions` and `forces` hold the values of all nodes of the mesh;
+    /// [`contact_forces`](crate::Simulation::contact_forces) returns contact forces. Where the contact zone ends
+    /// inside a facet, the area of a node is larger than its loaded area;
+    /// [`Mortar::area`](crate::contact::Mortar::area) returns the loaded one.
     ///
     /// # Errors
     ///
@@ -60,8 +62,8 @@ impl Surface {
         Ok(tractions.into_iter().map(|(pressure, _)| T::of(pressure)).collect())
     }
 
-    /// The shear stress (force/area) on each of its [`nodes`](Self::nodes) that forces make: (f − (f·A) A/|A|²)/|A|,
-    /// along the surface. See [`pressures`](Self::pressures).
+    /// The shear stress (force/area) along the surface at each of its [`nodes`](Self::nodes) from the given forces:
+    /// (f − (f·A) A/|A|²)/|A|. See [`pressures`](Self::pressures).
     ///
     /// # Errors
     ///
@@ -71,7 +73,7 @@ impl Surface {
         Ok(tractions.into_iter().map(|(_, shear)| std::array::from_fn(|axis| T::of(shear[axis]))).collect())
     }
 
-    /// Pressure and shear stress at each node; zero where facets cancel each other.
+    /// Pressure and shear stress at each node; zero where the normals of facets cancel.
     fn tractions<T: Real, const D: usize>(&self, positions: &[[T; D]], forces: &[[T; D]]) -> Result<Vec<(f64, Point)>> {
         let (positions, forces) = (self.points(positions)?, self.points(forces)?);
         let loaded = self.loaded(&forces);
@@ -89,16 +91,16 @@ impl Surface {
         Ok(self.nodes.iter().enumerate().map(traction).collect())
     }
 
-    /// Whether all nodes of each facet bear a force. (Of a facet of second order some bear none of a constant
-    /// pressure.)
+    /// Whether all nodes of each facet bear a force. Facets of second order always count, because some of their nodes
+    /// bear no force under a constant pressure.
     fn loaded(&self, forces: &[Point]) -> Vec<bool> {
         let bears = |node: &usize| forces[*node].iter().any(|&force| force != 0.0);
         self.facets.iter().map(|facet| facet.whole.is_some() || facet.nodes().iter().all(bears)).collect()
     }
 
-    /// The faces around a node that have a loaded facet there, or all of them if none has.
+    /// The faces around a node that have a loaded facet at the node; all faces if none has.
     fn faces(&self, place: usize, loaded: &[bool], positions: &[Point]) -> Vec<Face> {
-        /// Cosine between the normals of facets of one face at least: 37°.
+        /// Least cosine between the normals of facets of one face: 37°.
         const SMOOTH: f64 = 0.8;
         let mut faces: Vec<Face> = Vec::new();
         for &(index, corner) in self.corners_at(place) {
@@ -123,12 +125,12 @@ impl Surface {
         faces
     }
 
-    /// Forces as linear parts of facets of second order would have them, which have the same sum.
+    /// Redistributes the forces from the nodes of facets of second order to those of the linear parts. The sum stays.
     fn on_parts(&self, forces: Vec<Point>, loaded: &[bool], positions: &[Point]) -> Vec<Point> {
         if self.facets.iter().all(|facet| facet.whole.is_none()) {
             return forces;
         }
-        // By place, the facets there with their parts of the force: each hands on its own.
+        // For each place, the facets there with their shares of the force. Each facet redistributes its own share.
         let parts = |(place, &node): (usize, &usize)| -> Vec<(usize, Point)> {
             let faces = self.faces(place, loaded, positions);
             let (pressures, rest) = pressures_of(forces[node], &faces);
@@ -149,7 +151,7 @@ impl Surface {
                 let part = parts[self.place(node)].iter().find(|(facet, _)| *facet == index);
                 let Some(&(_, force)) = part else { continue };
                 for (other, share) in facet.all_nodes().zip(whole.given(corner)) {
-                    // (A part alone keeps what the others would get.)
+                    // A part whose other nodes are not on the surface keeps the force.
                     if self.nodes.binary_search(&other).is_ok() {
                         moved[node] = add_scaled(moved[node], -share, force);
                         moved[other] = add_scaled(moved[other], share, force);
@@ -160,7 +162,7 @@ impl Surface {
         moved
     }
 
-    /// Calls `act` with place of the node, its shape function, and area times normal, at the points of a quadrature.
+    /// Calls `act` with the place of the node, its shape function, and area times normal, at each quadrature point.
     fn integrate(&self, positions: &[Point], mut act: impl FnMut(usize, f64, Point)) {
         for facet in &self.facets {
             let shape = facet.shape(positions);
@@ -192,13 +194,13 @@ struct Face {
     facets: Vec<usize>,
 }
 
-/// The pressures of some faces of a node that make up its force best, all of one sign, and what they leave of it.
+/// The pressures on the faces of a node that fit its force best, all of one sign, and the remaining force.
 fn pressures_of(force: Point, faces: &[Face]) -> (Vec<f64>, Point) {
     const SWEEPS: usize = 200;
     let all = faces.iter().fold([0.0; 3], |sum, face| add_scaled(sum, 1.0, face.area));
     let sign = if dot(force, all) > 0.0 { -1.0 } else { 1.0 };
     let (mut pressures, mut rest) = (vec![0.0; faces.len()], force);
-    // (Projected Gauss–Seidel sweeps of least squares: one for one face, and where faces are at right angles.)
+    // Projected Gauss–Seidel sweeps of least squares. One sweep solves a single face.
     for _ in 0..if faces.len() > 1 { SWEEPS } else { 1 } {
         for (pressure, face) in pressures.iter_mut().zip(faces) {
             let square = dot(face.area, face.area);
@@ -213,15 +215,15 @@ fn pressures_of(force: Point, faces: &[Face]) -> (Vec<f64>, Point) {
     (pressures, rest)
 }
 
-/// Shape functions at some points of a facet, with the area times the normal that belongs to each.
+/// Shape functions at the quadrature points of a facet, each with its area times the normal.
 fn quadrature(facet: &Facet, shape: &Shape) -> Vec<([f64; 4], Point)> {
     let at = |weights: [f64; 4], share: f64| {
         let [first, second] = shape.tangents_at(&weights);
         let second = if shape.is_segment() { [0.0, 0.0, 1.0] } else { second };
         (weights, cross(first, second).map(|x| share * x))
     };
-    // Linear functions on segments and triangles; of a bilinear quadrilateral N n dA is of degree two in each
-    // direction.
+    // One point is exact for linear functions on segments and triangles. On a bilinear quadrilateral N n dA is of
+    // degree two in each direction.
     match facet.count {
         2 => vec![at([0.5, 0.5, 0.0, 0.0], 1.0)],
         3 => vec![at([1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0], 0.5)],

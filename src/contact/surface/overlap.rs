@@ -1,30 +1,32 @@
-//! Where two facets lie over each other: the part of the one that the other covers, and points to integrate over it.
+//! The part of a slave facet that a master facet covers, and quadrature points on it.
 //!
-//! Both are projected onto the plane of the slave facet through its middle, along its normal there. Lines between nodes
-//! stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004,
-//! section 4); in two dimensions it is a part of a line.
+//! Both are projected onto the plane through the middle of the slave facet, along its normal there. Lines between
+//! nodes stay lines, so that the common part is a polygon (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193,
+//! 2004, section 4). In two dimensions it is a part of a line.
 
 use super::exact::{RulePoint, RulePoints};
 use super::polygon::{Polygon, Rule};
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 use super::{Facet, Surface};
 
-/// A point of the part of a slave facet that a master facet covers.
+/// A quadrature point on the part of a slave facet that a master facet covers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     /// Its share of the area (length in two dimensions) in the slave facet's plane.
     pub(crate) area: f64,
-    /// Shape functions of the slave facet, and of the master facet where the normal through the point meets it.
+    /// Shape functions of the slave facet, and of the master facet at its intersection with the normal through the
+    /// point.
     pub(crate) slave: [f64; 4],
     pub(crate) master: [f64; 4],
-    /// The distance from the one to the other along the slave facet's normal: negative where they are in each other.
+    /// The distance from slave to master along the slave facet's normal: negative where they penetrate each other.
     pub(crate) gap: f64,
-    /// The master facet's normal ν there over its product with the slave facet's normal n: the gap falls by it if the
-    /// slave's point moves, and grows by it if the master's does.
+    /// ν/(ν · n), with the normal ν of the master facet there and the normal n of the slave facet. The gap changes by
+    /// minus its product with the motion of the slave point, and by plus its product with the motion of the master
+    /// point.
     pub(crate) direction: Point,
 }
 
-/// A point of a slave facet that lies below a side where the master ends.
+/// A point of a slave facet that lies below an open side of the master surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RimSample {
     /// Its share of the length in the plane (one in two dimensions).
@@ -32,7 +34,7 @@ pub(crate) struct RimSample {
     pub(crate) slave: [f64; 4],
     pub(crate) master: [f64; 4],
     pub(crate) gap: f64,
-    /// The direction in the plane in which the master ends: a unit vector.
+    /// The outward unit normal of that side in the slave's plane.
     pub(crate) outward: Point,
 }
 
@@ -41,7 +43,8 @@ pub(crate) struct RimSample {
 pub(crate) struct Base {
     pub(crate) shape: Shape,
     pub(crate) normal: Point,
-    /// The product of the tangents there, along the normal (of a segment with the unit vector out of the plane).
+    /// The product of the tangents there, along the normal. For a segment the second tangent is the unit vector out
+    /// of plane.
     pub(crate) product: Point,
     axes: [Point; 2],
     /// Its corners in the plane.
@@ -54,22 +57,23 @@ pub(crate) struct Base {
     curved: bool,
 }
 
-/// The weights of the middle of a facet.
+/// The shape functions at the middle of a facet.
 pub(crate) fn middle(count: usize) -> [f64; 4] {
     let share = 1.0 / count as f64;
     std::array::from_fn(|k| if k < count { share } else { 0.0 })
 }
 
-/// Least cosine between the normal of a facet and the opposite of the other one's, if they are to meet: 60 degrees.
+/// Least cosine between the normal of a facet and the reversed normal of another one in contact: 60 degrees.
 const FACING: f64 = 0.5;
 
-/// Share of a facet that is too small to be a common part.
+/// Common parts below this share of the facet's size are dropped.
 const SLIVER: f64 = 1e-12;
 
-/// Greatest cosine between the normals of facets beside a sharp edge: 37 degrees.
+/// Largest cosine between the normals of facets at a sharp edge: 37 degrees.
 const SHARP: f64 = 0.8;
 
-/// Share of its depth below a facet that a point is at most below one behind a sharp edge and belongs to that one.
+/// A point below a facet belongs to a facet behind a sharp edge if its depth below that one is at most this share of
+/// its depth below this facet.
 const NEARER: f64 = 0.25;
 
 impl Base {
@@ -89,10 +93,10 @@ impl Base {
         Some(base)
     }
 
-    /// Lets it see what is behind its sharp edges, so that nothing is met through the body: what has come in over
-    /// there, or lies there, is not below this facet.
+    /// Stores the facets behind sharp edges of this one, so that there is no contact through the body: points that
+    /// have penetrated one of these facets, or lie behind it, are not below this facet.
     ///
-    /// `normals` are those in the middles of all facets.
+    /// `normals` are the normals at the middles of all facets.
     pub(crate) fn see_beside(
         &mut self,
         surface: &Surface,
@@ -110,17 +114,17 @@ impl Base {
         }
     }
 
-    /// Whether what is at x, by `gap` above the facet, belongs to a facet behind a sharp edge.
+    /// Whether a point x, at `gap` above this facet, belongs to a facet behind a sharp edge.
     pub(super) fn is_beside(&self, x: Point, gap: f64) -> bool {
         let is_above = |[point, normal]: &[Point; 2]| dot(*normal, sub(x, *point)) > NEARER * gap;
         gap < 0.0 && self.beside.iter().flatten().any(is_above)
     }
 
-    /// Whether a master facet belongs to facets behind sharp edges: for most of what it covers, or with all corners if
-    /// it covers nothing.
+    /// Whether a master facet belongs to facets behind sharp edges: with more than half of the area that it covers
+    /// here, or with all corners if it covers nothing.
     ///
-    /// (Decided for the facet as a whole, in a search. Point by point, while rows are linearized again, points came and
-    /// went with what the contact made of them, and rows found no rest.)
+    /// Each search decides this for the facet as a whole. Decided point by point at each relinearization, points
+    /// appeared and disappeared with the contact forces, and the iteration did not converge.
     pub(crate) fn has_beside(&self, facet: &Facet, positions: &[Point]) -> bool {
         if self.beside.iter().all(Option::is_none) || self.lowest(facet, positions) >= 0.0 {
             return false;
@@ -141,7 +145,7 @@ impl Base {
             .all(|(&node, gap)| self.is_beside(positions[node], gap))
     }
 
-    /// Whether most of what a master facet covers is deeper behind this one than `depth`.
+    /// Whether more than half of the area that a master facet covers is deeper than `depth` behind this facet.
     pub(crate) fn is_deeper(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
         if self.lowest(facet, positions) >= -depth {
             return false;
@@ -166,20 +170,20 @@ impl Base {
         facet.nodes().iter().map(|&node| dot(self.normal, sub(positions[node], self.shape.corner(0))))
     }
 
-    /// Whether a facet with this normal looks toward this one, and is not behind it by more than `depth`.
+    /// Whether a facet with this normal faces this one and is not behind it by more than `depth`.
     #[inline]
     pub(crate) fn may_meet(&self, normal: Point, facet: &Facet, positions: &[Point], depth: f64) -> bool {
         dot(normal, self.normal) < -FACING && self.heights(facet, positions).any(|height| height > -depth)
     }
 
-    /// How low a facet is at least, below all corners of this one.
+    /// The height of the lowest corner of a facet above the highest corner of this one; negative if it is below.
     pub(crate) fn lowest(&self, facet: &Facet, positions: &[Point]) -> f64 {
         let corner = |x: &Point| dot(self.normal, sub(*x, self.shape.corner(0)));
         let highest = self.shape.corners().iter().map(corner).fold(0.0, f64::max);
         self.heights(facet, positions).fold(f64::INFINITY, f64::min) - highest
     }
 
-    /// Calls `act` with the points of what a master facet covers.
+    /// Calls `act` with the quadrature points of the part that a master facet covers.
     pub(crate) fn each_sample(&self, facet: &Facet, positions: &[Point], act: &mut impl FnMut(&Sample)) {
         let (shape, count) = (facet.shape(positions), facet.nodes().len());
         let corners = std::array::from_fn(|k| self.in_plane(shape.corner(k)));
@@ -230,13 +234,13 @@ impl Base {
         let cosine = dot(normal, self.normal);
         let point = shape.point(&master);
         let gap = dot(self.normal, sub(point, self.shape.point(&slave)));
-        // (A warped facet may be seen from its side somewhere.)
+        // A point of a warped facet may face away.
         if cosine < 0.0 && gap.is_finite() {
             act(&Sample { area, slave, master, gap, direction: normal.map(|x| x / cosine) });
         }
     }
 
-    /// Calls `act` with points below the sides of a master facet where its surface ends.
+    /// Calls `act` with quadrature points below the open sides of a master facet.
     pub(crate) fn each_rim_sample(
         &self,
         facet: &Facet,
@@ -268,7 +272,8 @@ impl Base {
             let way = [to[0] - from[0], to[1] - from[1]];
             let length = way[0].hypot(way[1]);
             let Some([begin, end]) = own.crossing(from, way) else { continue };
-            // Seen from the slave the master goes around clockwise: what is on its left is outside.
+            // Seen from the slave the master's corners are in clockwise order, so its outside is on the left of each
+            // side.
             let outward = [-way[1] / length, way[0] / length];
             for (weight, place) in LINE {
                 let share = begin + place * (end - begin);
@@ -278,31 +283,31 @@ impl Base {
         }
     }
 
-    /// The product of the tangents where the shape functions are `weights` (of a segment with the unit vector out of
-    /// the plane), and the derivative of its part along n, the facet's area for its coordinates, by the corners.
+    /// The product t₁ × t₂ of the tangents at the point with these shape functions, and the derivatives of its
+    /// component along n, the facet's area per unit of its coordinates, by the corners. The second tangent of a
+    /// segment is the unit vector out of plane.
     #[inline]
     pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
         let tangents = self.tangents(weights);
         (cross(tangents[0], tangents[1]), self.turned_by(tangents, weights, self.normal))
     }
 
-    /// The tangents where the shape functions are `weights`, the second one of a segment being the unit vector out of
-    /// the plane.
+    /// The tangents at the point with these shape functions. The second one of a segment is the unit vector out of
+    /// plane.
     #[inline]
     fn tangents(&self, weights: &[f64; 4]) -> [Point; 2] {
         let [first, second] = self.shape.tangents_at(weights);
         [first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }]
     }
 
-    /// An orthonormal frame that turns with the facet: along its first tangent in the middle, across it, and n.
+    /// An orthonormal frame that turns with the facet: its first tangent at the middle, the vector across it, and n.
     pub(crate) fn frame(&self) -> [Point; 3] {
         [self.axes[0], self.axes[1], self.normal]
     }
 
-    /// How the corners turn [`frame`](Self::frame): for a vector q, those that their motions are multiplied by in the
-    /// sum θ · q, θ the small rotation of the frame.
+    /// The derivatives of θ · q by the corners, for a vector q and the small rotation θ of [`frame`](Self::frame).
     ///
-    /// n × δn is the part of θ across n, and along n it is e₂ · δe₁ with e₁ and e₂ the first two vectors.
+    /// The part of θ across n is n × δn. Along n it is e₂ · δe₁ with the first two vectors e₁ and e₂.
     pub(crate) fn rotated(&self, q: Point) -> [Point; 4] {
         let weights = middle(self.count);
         let [first, _] = self.shape.tangents_at(&weights);
@@ -312,18 +317,19 @@ impl Base {
         std::array::from_fn(|k| add_scaled(tilted[k], spin * by_corner[k], self.axes[1]))
     }
 
-    /// How a function with these values at the corners of a master facet grows where the rays of this facet meet it, if
-    /// the point below moves: along the facet, for the foot of the ray moves with it.
+    /// The gradient, with respect to the slave point, of a function with these values at the corners of a master
+    /// facet, at the intersection with the ray of this facet. It lies in the facet's plane, because the ray moves
+    /// with the point.
     ///
-    /// With d the vectors across n whose products with the tangents are 0 and 1, dξ = d · dx for the foot's coordinate
-    /// ξ.
+    /// With d the vectors across n whose products with the tangents are 0 and 1, the coordinate ξ of the intersection
+    /// changes by dξ = d · dx.
     pub(crate) fn slope(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], values: &[f64; 4]) -> Point {
         let by_corner = derivatives(facet.nodes().len(), weights);
         let change = by_corner.map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
         self.gradient(facet, positions, weights, change)
     }
 
-    /// As [`slope`](Self::slope), of how high along n a master facet of second order is over its linear part.
+    /// As [`slope`](Self::slope), for the height along n of a master facet of second order over its linear part.
     pub(crate) fn slope_of_second_order(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4]) -> Point {
         let Some(whole) = &facet.whole else { return [0.0; 3] };
         let slopes = whole.excess_slopes(weights, &derivatives(facet.nodes().len(), weights));
@@ -331,7 +337,7 @@ impl Base {
         self.gradient(facet, positions, weights, change)
     }
 
-    /// The slope of what changes like this with the coordinates of a master facet.
+    /// The gradient of a function with these derivatives with respect to the coordinates of a master facet.
     fn gradient(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], change: [f64; 2]) -> Point {
         let [first, second] = facet.shape(positions).tangents_at(weights);
         let second = if facet.nodes().len() == 2 { [0.0, 0.0, 1.0] } else { second };
@@ -346,8 +352,8 @@ impl Base {
         self.count
     }
 
-    /// The derivative of `vector · (t₁ × t₂)` by the corners, t the tangents where the shape functions are `weights`:
-    /// the vector that each corner's motion is multiplied by.
+    /// The derivatives of `vector · (t₁ × t₂)` by the corners, with the tangents t at the point with these shape
+    /// functions.
     #[inline]
     pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
         self.turned_by(self.tangents(weights), weights, vector)
@@ -355,14 +361,14 @@ impl Base {
 
     #[inline]
     fn turned_by(&self, [first, second]: [Point; 2], weights: &[f64; 4], vector: Point) -> [Point; 4] {
-        // (The second tangent of a segment has no derivatives.)
+        // The second tangent of a segment is constant.
         let [by_first, by_second] = [cross(second, vector), cross(vector, first)];
         let [one, other] = derivatives(self.count, weights);
         std::array::from_fn(|k| add_scaled(by_first.map(|x| one[k] * x), other[k], by_second))
     }
 }
 
-/// How the tangents follow from the corners: their coefficients where the shape functions are `weights`.
+/// Coefficients of the corners in the two tangents at the point with these shape functions.
 #[inline]
 fn derivatives(count: usize, weights: &[f64; 4]) -> [[f64; 4]; 2] {
     match count {
@@ -385,7 +391,8 @@ pub(super) struct Flat {
 }
 
 impl Flat {
-    /// The shape functions at a point: of a quadrilateral by Newton's method, which ends at once on parallelograms.
+    /// The shape functions at a point. For quadrilaterals by Newton's method, which takes one iteration on
+    /// parallelograms.
     #[inline]
     pub(super) fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
@@ -410,7 +417,7 @@ impl Flat {
             let [by_s, by_t] = [std::array::from_fn(|i| a[i] + t * c[i]), std::array::from_fn(|i| b[i] + s * c[i])];
             let [ds, dt] = solve(by_s, by_t, missing);
             (s, t) = (s + ds, t + dt);
-            // What is missing now is ds dt c.
+            // The residual is now ds dt c.
             if (ds * dt).abs() * skew <= f64::EPSILON * size {
                 break;
             }
@@ -418,13 +425,13 @@ impl Flat {
         [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
     }
 
-    /// Which shares of a way are inside, from and to, if any are.
+    /// The interval of a line segment, in shares of its length, that lies inside; none if it is empty.
     fn crossing(&self, from: [f64; 2], way: [f64; 2]) -> Option<[f64; 2]> {
         let (mut begin, mut end) = (0.0_f64, 1.0_f64);
         for k in 0..self.count {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
             let side = [b[0] - a[0], b[1] - a[1]];
-            // Heights over the side at the start, and gained along the way.
+            // Height of the start over the side, and its gain along the segment.
             let height = side[0] * (from[1] - a[1]) - side[1] * (from[0] - a[0]);
             let gain = side[0] * way[1] - side[1] * way[0];
             if gain > 0.0 {
@@ -438,8 +445,8 @@ impl Flat {
         (begin < end).then_some([begin, end])
     }
 
-    /// What another one that goes the other way around has in common with this one, if its area is above `least`
-    /// (Sutherland and Hodgman, Commun. ACM 17, 1974).
+    /// The common part with another polygon of opposite orientation, if its area is above `least` (Sutherland and
+    /// Hodgman, Commun. ACM 17, 1974).
     #[inline]
     fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
         let is_apart = |axis: usize| {
@@ -461,6 +468,6 @@ impl Flat {
     }
 }
 
-/// Gauss' rule of three points on a line of length one (degree 5): weight and place.
+/// Gauss' rule of three points on a line of length one (degree 5): weight and position.
 const LINE: [(f64, f64); 3] =
     [(5.0 / 18.0, 0.112_701_665_379_258_31), (8.0 / 18.0, 0.5), (5.0 / 18.0, 0.887_298_334_620_741_7)];

@@ -1,18 +1,19 @@
-//! The common part of two facets as a polygon, and points to integrate over it.
+//! The common part of two facets as a polygon, and quadrature points on it.
 
 /// A rule on a triangle, by its degree.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Rule {
-    /// Enough for products of two linear functions.
+    /// Exact for products of two linear functions.
     Two,
-    /// Enough for products of two bilinear ones on parallelograms.
+    /// Exact for products of two bilinear functions on parallelograms.
     Four,
-    /// For quadrilaterals of second order: with less their rows are off the derivatives of gaps by some 1e-4.
+    /// For quadrilaterals of second order. At a lower degree their rows deviate from the gap derivatives by about
+    /// 1e-4.
     Six,
 }
 
 impl Rule {
-    /// Weight, and the three weights of the corners.
+    /// Weight of each point, and its three barycentric coordinates.
     fn points(self) -> &'static [[f64; 4]] {
         match self {
             Self::Two => &THREE,
@@ -22,7 +23,7 @@ impl Rule {
     }
 }
 
-/// A direction in the plane of a facet, across no side that facets have as a rule.
+/// A direction in the plane of a facet that is usually not perpendicular to any side.
 const APEX: [f64; 2] = [0.8146, 0.58];
 
 /// A convex polygon: a quadrilateral cut by four lines.
@@ -35,7 +36,7 @@ pub(super) struct Polygon {
 impl Polygon {
     #[inline]
     pub(super) fn push(&mut self, corner: [f64; 2]) {
-        // (A quadrilateral that is not convex may have more corners in common: the last ones are left out.)
+        // The common part with a nonconvex quadrilateral may have more corners. The last ones are dropped.
         if let Some(place) = self.corners.get_mut(self.count) {
             *place = corner;
             self.count += 1;
@@ -58,11 +59,11 @@ impl Polygon {
         corners.windows(2).map(triangle).sum()
     }
 
-    /// The same, listed from the corner that is farthest in a fixed direction.
+    /// The same polygon, listed from the corner that is farthest in a fixed direction.
     ///
-    /// (A rule on the triangles from there changes with the polygon as smoothly as this does: where two corners come
-    /// out of one, a triangle without area is added. Listed as they are found, another corner would be the first, and
-    /// what the rule lacks another: rows would not find rest.)
+    /// The quadrature over the triangle fan from that corner changes smoothly with the polygon: where one corner
+    /// splits in two, a triangle without area is added. In the order of the clipping, the first corner could change,
+    /// the quadrature error would jump, and the iteration of the rows would not converge.
     #[inline]
     fn turned_to_apex(&self) -> Self {
         let height = |corner: &[f64; 2]| APEX[0] * corner[0] + APEX[1] * corner[1];
@@ -73,7 +74,7 @@ impl Polygon {
         turned
     }
 
-    /// Calls `act` with weights and points of a rule on triangles that make up the polygon.
+    /// Calls `act` with weights and points of a rule on the triangles of the polygon.
     pub(super) fn each_point(&self, rule: Rule, act: &mut impl FnMut(f64, [f64; 2])) {
         let turned = self.turned_to_apex();
         let [first, rest @ ..] = turned.corners() else { return };
@@ -86,7 +87,7 @@ impl Polygon {
         }
     }
 
-    /// What is to the left of a line.
+    /// The part of the polygon to the left of a line.
     #[inline]
     pub(super) fn cut(&self, from: [f64; 2], to: [f64; 2]) -> Self {
         let along = [to[0] - from[0], to[1] - from[1]];
@@ -109,8 +110,8 @@ impl Polygon {
     }
 }
 
-/// Rules on a triangle of area one: weight, and the three weights of the corners (Dunavant, Int. J. Numer. Methods Eng.
-/// 21, 1985), of degree 2, 4 and 6.
+/// Rules of degree 2, 4 and 6 on a triangle of area one: weight and barycentric coordinates (Dunavant, Int. J. Numer.
+/// Methods Eng. 21, 1985).
 const THREE: [[f64; 4]; 3] = [
     [1.0 / 3.0, 2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
     [1.0 / 3.0, 1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
@@ -166,7 +167,7 @@ mod tests {
                 let found = integral(&polygon(&SQUARE), rule, |[x, y]| x.powi(i) * y.powi(j));
                 assert!((found - 1.0 / f64::from((i + 1) * (j + 1))).abs() < 1e-15, "{rule:?}: x^{i} y^{j}: {found}");
             }
-            // (Of odd powers the square has what is symmetric alone.)
+            // Degree + 2 is used, because on the square the errors of odd powers cancel by symmetry.
             let beyond = integral(&polygon(&SQUARE), rule, |[x, _]| x.powi(degree + 2));
             assert!((beyond - 1.0 / f64::from(degree + 3)).abs() > 1e-9, "{rule:?}: {beyond}");
         }
@@ -174,7 +175,8 @@ mod tests {
 
     #[test]
     fn integrals_change_as_smoothly_as_the_polygon() {
-        // What no rule has exactly; each corner in turn is cut off by a little, and listed first or not.
+        // A function that no rule integrates exactly. Each corner in turn is cut off a little, with every order of
+        // the corners.
         let of = |[x, y]: [f64; 2]| (3.0 * x + 2.0 * y).sin();
         let whole = integral(&polygon(&SQUARE), Rule::Four, of);
         for (cut, first) in (0..4).flat_map(|cut| (0..5).map(move |first| (cut, first))) {

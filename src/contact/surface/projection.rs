@@ -1,4 +1,4 @@
-//! Where a node stands on a surface: what searching and following share, and how the gap accelerates along a motion.
+//! Projection of a node onto a surface, in the search and within a step, and the gap acceleration along a motion.
 
 use super::Surface;
 use super::cones::Cones;
@@ -10,20 +10,20 @@ use super::search::{Bounds, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
 use std::cell::OnceCell;
 
-/// Cosine of the angle between the normals of a node and a facet above which the node does not meet the facet: both
-/// look to the same side.
+/// Cosine of the angle between the normals of a node and a facet above which they are not in contact: both point to
+/// the same side.
 const SAME_SIDE: f64 = 0.5;
 
-/// The same for the facet that a node stands on already, within a step.
+/// The same limit for the facet that a node is already projected on, within a step.
 const SAME_SIDE_OF_LAST: f64 = 0.75;
 
-/// The same for a facet beside it on its own body.
+/// The same limit for such a facet that is beside the node on its own body.
 const FACING_OF_LAST: f64 = 0.25;
 
-/// How far, in shares of the facet, the surface goes on beyond its rim for a node that leaves it within a step.
+/// Extension of the surface beyond its rim for a node that leaves it within a step, as a share of the facet.
 const RIM_OF_LAST: f64 = 0.25;
 
-/// Where a node stood at some time.
+/// The projection of a node at some time.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     t: f64,
@@ -31,10 +31,10 @@ struct Seen {
     facet: usize,
 }
 
-/// How a node stands on a surface: the facet and its closest point, the normal and the gap there.
+/// The projection of a node onto a surface: the facet and its closest point, the normal and the gap there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stand {
-    /// Index of the node in the list of nodes that may stand on the surface.
+    /// Index of the node in the list of the slave nodes.
     pub(crate) place: usize,
     /// Index of the facet in the surface.
     pub(crate) facet: usize,
@@ -42,51 +42,51 @@ pub(crate) struct Stand {
     /// Shape functions of the facet's vertices at the closest point.
     pub(crate) weights: [f64; 4],
     pub(crate) normal: Point,
-    /// The distance from that point along the normal, and what is left of it by the offsets of both surfaces.
+    /// The distance from that point along the normal, and the gap: this distance less the offsets of both surfaces.
     pub(super) distance: f64,
     pub(crate) gap: f64,
-    /// The sum of these offsets in full size, and the factor that the gap was made with.
+    /// The sum of these offsets at full size, and their factor in the gap.
     pub(crate) offset: f64,
     pub(crate) factor: f64,
-    /// How often the node has jumped to another facet or normal since the search.
+    /// How often the node has changed its facet or normal since the search.
     jumps: u8,
-    /// Where it stood last at the two times that rows are followed to in a step (where the gap is met, where the
-    /// balance holds), the one seen last first.
+    /// The last projections at the two times at which a step evaluates rows (where the gap is zero, where the balance
+    /// holds), the latest evaluation first.
     seen: [Option<Seen>; 2],
 }
 
-/// Nodes and a surface that they may stand on, at given positions of both.
+/// Slave nodes and a surface, at given positions of both.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     pub(crate) nodes: &'a [usize],
-    /// The facets near each node, if known; otherwise all are looked at.
+    /// The facets near each node, if known; otherwise all facets are tried.
     pub(crate) lists: Option<&'a NearestFirst>,
-    /// What has moved since they were built, if it is known: then a node looks no farther than it must.
+    /// The motions since the lists were built, if known; they end the search of a list early.
     pub(crate) kept: Option<Kept<'a>>,
     pub(crate) surface: &'a Surface,
-    /// The boxes of its facets, if they are known.
+    /// The boxes of its facets, if known.
     pub(crate) boxes: Option<&'a [Bounds]>,
-    /// The cones of its normals, and those of the nodes' own surface, if they are known.
+    /// The cones of the normals of this surface and of the nodes' own surface, if known.
     pub(crate) cones: [Option<&'a Cones>; 2],
     /// The surface of the nodes, if known.
     pub(crate) own: Option<&'a Surface>,
-    /// What nodes do not meet of it, if it is the same surface.
+    /// The facets excluded for each node, if the nodes are on this same surface.
     pub(crate) kin: Option<&'a Kin>,
-    /// The material behind the nodes of that surface and of the other one, if both are known.
+    /// The material behind the nodes' own surface and behind this one, if both are known.
     pub(crate) material: Option<[&'a Material; 2]>,
     pub(crate) positions: &'a [Point],
     pub(crate) offsets: Offsets<'a>,
-    /// Shares of a facet below which closeness to a side or a vertex is rounding.
+    /// Distance from a side or a vertex, as a share of a facet, below which it counts as rounding.
     pub(crate) rounding: f64,
 }
 
 impl Ground<'_> {
-    /// Facets to look at for the node at a place of the list.
+    /// Candidate facets for the node at a place of the list.
     pub(crate) fn near(&self, place: usize) -> impl Iterator<Item = usize> {
         self.by_distance(place).map(|(_, facet)| facet).filter(move |&facet| self.may_meet(place, facet))
     }
 
-    /// Facets in the order of the list, with the distances there.
+    /// Facets in the order of the list, with their listed distances.
     fn by_distance(&self, place: usize) -> impl Iterator<Item = (f64, usize)> + use<'_> {
         let list = self.lists.map(|lists| lists.of(place));
         let count = list.map_or(self.surface.facets().len(), <[_]>::len);
@@ -97,8 +97,8 @@ impl Ground<'_> {
         self.kin.is_none_or(|kin| !kin.keeps_apart(place, facet))
     }
 
-    /// The corners of a facet, as far out along its normal as a node that touches its surface is, and the facet itself
-    /// if that is behind.
+    /// The corners of a facet moved along its normal by the offsets of the node and the facet, and the facet itself
+    /// if it lies behind these.
     pub(crate) fn layers(&self, place: usize, facet: usize) -> impl Iterator<Item = [Point; 4]> + use<> {
         let facet = &self.surface.facets()[facet];
         let corners = facet.nodes.map(|vertex| self.positions[vertex]);
@@ -110,12 +110,12 @@ impl Ground<'_> {
         outer.into_iter().chain(is_behind.then_some(corners))
     }
 
-    /// Whether a node with this normal, if it has one, meets the front of a facet with that one.
+    /// Whether a node with `own_normal`, if it has one, can be in contact with the front of a facet with `normal`.
     pub(crate) fn meets(&self, (place, facet): (usize, usize), normal: Point, own_normal: Option<Point>) -> bool {
         own_normal.is_none_or(|own| dot(own, normal) <= self.limit(place, facet))
     }
 
-    /// The cosine between the normals of a node and of a facet up to which they meet.
+    /// The largest cosine between the normals of a node and a facet in contact.
     fn limit(&self, place: usize, facet: usize) -> f64 {
         if self.is_kin(place, facet) { FACING } else { SAME_SIDE }
     }
@@ -130,7 +130,8 @@ impl Ground<'_> {
         self.kin.is_some() && self.material.is_some_and(of_own)
     }
 
-    /// How deep behind a facet a node may be in contact with it; none if its own surface is not known.
+    /// The largest depth behind a facet at which a node is in contact with it; none if the node's own surface is not
+    /// known.
     fn depth(&self, place: usize, facet: usize) -> Option<f64> {
         let ([own, other], surface) = self.material.zip(self.own)?;
         let own_place = surface.nodes().binary_search(&self.nodes[place]).ok()?;
@@ -138,9 +139,11 @@ impl Ground<'_> {
         Some(own.behind(own_place) + behind)
     }
 
-    /// Whether a node is behind a facet by so much that there is material of both bodies between them, or of its own
-    /// one. (By the normal that the gap would have: on a side or a vertex a node may be in front of the one facet and
-    /// behind the other. Where it looks along that normal itself there is its own body on the way, whose flanks bulge.)
+    /// Whether a node is so deep behind a facet that material of both bodies, or of its own body, lies between them.
+    ///
+    /// The sign is taken along the normal of the gap, because over a side or a vertex a node may be in front of one
+    /// facet and behind the other. If the node's own normal points along that normal, its own body with its bulging
+    /// flanks is between.
     fn is_beyond(
         &self,
         place: usize,
@@ -155,14 +158,14 @@ impl Ground<'_> {
             && self.direction(place, facet, p, projected).is_some_and(is_behind)
     }
 
-    /// The closest facet of the node at a place of the list, if its surface is within `reach`; none beyond the rim.
-    /// Found sooner if it is the one that is `likely`.
+    /// The projection onto the closest facet of the node at a place of the list, if its surface is within `reach`;
+    /// none beyond the rim. A facet that is `likely` the closest one is tried first, which saves time.
     pub(crate) fn closest(&self, place: usize, reach: f64, likely: Option<usize>) -> Option<Stand> {
         let (facet, projected) = self.nearest(place, reach, likely)?;
         self.on(place, facet, &projected)
     }
 
-    /// A bound of the distance of that surface, or of its rim, and the stand on it; `reach` if there is none as near.
+    /// A bound of the distance to that surface or its rim, and the projection; `reach` if no surface is within it.
     pub(crate) fn clearance(&self, place: usize, reach: f64) -> (f64, Option<Stand>) {
         let Some((facet, projected)) = self.nearest(place, reach, None) else { return (reach, None) };
         let stand = self.on(place, facet, &projected);
@@ -170,8 +173,8 @@ impl Ground<'_> {
         (stand.map_or(height, |stand| height.min(stand.gap.abs())), stand)
     }
 
-    /// How far a node is from a facet less their offsets: where offsets are the same everywhere the closest facet comes
-    /// first, otherwise that whose surface is closest.
+    /// The distance of a node from a facet less their offsets. With the same offsets everywhere the closest facet is
+    /// the nearest one by this measure, otherwise the facet whose offset surface is closest.
     fn height(&self, place: usize, facet: usize, foot: &Foot) -> f64 {
         let Offsets { factor, .. } = self.offsets;
         foot.distance - factor * self.offsets.upon(self.nodes[place], &self.surface.facets()[facet], &foot.weights)
@@ -186,7 +189,7 @@ impl Ground<'_> {
         let own_place = self.own_place(place);
         let slack = self.kept.zip(self.lists).map_or(f64::INFINITY, |(kept, lists)| kept.slack(lists, node, p));
         let is_even = self.offsets.is_none();
-        // (Distances of surfaces, and what offsets may take from those of the facets at most.)
+        // Heights are distances of offset surfaces. They differ from the distances of facets by at most this.
         let most = |facet: usize| if is_even { 0.0 } else { self.offsets.most(node, &surface.facets()[facet]) };
         let mut best: Option<(usize, (Shape, Foot), f64)> = None;
         let look_at = |facet: usize, best: &mut Option<(usize, (Shape, Foot), f64)>| {
@@ -200,7 +203,7 @@ impl Ground<'_> {
             }
             let Some(projected) = surface.project(facet, p, positions) else { return };
             let depth = self.height(place, facet, &projected.1);
-            // (Of two that share the point the one that comes first.)
+            // Of two facets that share the point, the first one wins.
             let foot = Foot { distance: depth, ..projected.1 };
             let is_better = |(other, (_, best), depth): &(usize, (Shape, Foot), f64)| {
                 let best = Foot { distance: *depth, ..*best };
@@ -219,7 +222,7 @@ impl Ground<'_> {
                 *best = Some((facet, projected, depth));
             }
         };
-        // The first one decides which of the others are too far by their boxes.
+        // The height over the first facet excludes others by their boxes.
         let is_listed = |likely: &usize| self.by_distance(place).any(|(_, facet)| facet == *likely);
         let first = likely.filter(is_listed);
         if let Some(facet) = first {
@@ -234,20 +237,20 @@ impl Ground<'_> {
         best.map(|(facet, projected, _)| (facet, projected))
     }
 
-    /// Where a node is in its own surface, if it is there at the place that it has in the list.
+    /// The place of a node in its own surface, if it equals its place in the list.
     fn own_place(&self, place: usize) -> Option<usize> {
         self.own.filter(|own| own.nodes().get(place) == Some(&self.nodes[place])).map(|_| place)
     }
 
-    /// Whether a facet is turned against the normal of a node by all that is known of the normals around both.
+    /// Whether a facet surely faces a node, by the cones of the normals around both.
     fn surely_faces(&self, own_place: Option<usize>, facet: usize, limit: f64) -> bool {
         let [Some(cones), Some(own_cones)] = self.cones else { return false };
         let surely = |(own, place): (&Surface, usize)| own_cones.surely_face(own, place, (cones, facet), limit);
         self.own.zip(own_place).is_some_and(surely)
     }
 
-    /// The facet that the node stood on last, within `reach`: it is left less easily than it is found, so that a node
-    /// that slides over the rim, or turns away, ends its step.
+    /// The projection onto the last facet of a node, within `reach`. Its limits are wider than those of the search,
+    /// so that a node that slides over the rim or turns away finishes its step.
     pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
@@ -260,16 +263,17 @@ impl Ground<'_> {
         self.own.and_then(|own| own.node_normal(self.nodes[place], self.positions))
     }
 
-    /// The vertex that a stand is on, if it is on one.
+    /// The vertex at which a projection lies, if any.
     pub(crate) fn vertex(&self, stand: &Stand) -> Option<usize> {
         let mut vertices = self.surface.facets()[stand.facet].nodes().iter().zip(&stand.weights);
         vertices.find(|(_, weight)| **weight >= 1.0 - self.rounding).map(|(&vertex, _)| vertex)
     }
 
-    /// Whether a node that stands on a vertex, which stands on the node, leaves the row to that: the sharper one of
-    /// both keeps it, which may have rows in a dent too, or else the first one. (What stands on a corner slides off.)
+    /// Whether a node that is projected onto a vertex, which in turn is projected onto the node, has no row because
+    /// the vertex has it. The sharper one of the two keeps the row, because it may be in a dent and have rows there,
+    /// and because a node on a sharp corner slides off. If both are equally sharp, the first one keeps it.
     pub(crate) fn is_second(&self, stand: &Stand, pass: usize) -> bool {
-        /// Sine below which a difference is rounding.
+        /// Differences of sines below this are rounding.
         const ROUNDING: f64 = 1e-6;
         let Some(vertex) = self.vertex(stand) else { return false };
         let node = self.nodes[stand.place];
@@ -279,9 +283,9 @@ impl Ground<'_> {
         steeper > ROUNDING || (steeper >= -ROUNDING && comes_later)
     }
 
-    /// The normal along which a node at p stands on a facet, and its distance along it.
+    /// The normal of the projection of a node at p onto a facet, and the distance along it.
     fn direction(&self, place: usize, facet: usize, p: Point, projected: &(Shape, Foot)) -> Option<(Point, f64)> {
-        // (Asked for by the facets around a vertex or a side that the node touches only, by each of them.)
+        // Computed at most once, and only if the node touches a vertex or a side.
         let own = OnceCell::new();
         let meets = |normal: Point| self.meets((place, facet), normal, *own.get_or_init(|| self.own_normal(place)));
         self.surface.direction(facet, p, projected, (self.rounding, &meets), self.positions)
@@ -297,7 +301,7 @@ impl Ground<'_> {
         Some(self.stand((place, facet), location, weights, normal, distance))
     }
 
-    /// Of a node on a facet, with the offsets of both.
+    /// The projection of a node onto a facet, with the offsets of both.
     pub(super) fn stand(
         &self,
         (place, facet): (usize, usize),
@@ -313,16 +317,16 @@ impl Ground<'_> {
     }
 }
 
-/// Whether a facet is turned against the normal of a node, if that is known.
+/// Whether a facet faces a node with this normal; true if the normal is not known.
 fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f64) -> bool {
     let same = |normal: Point| shape.normal(&foot.weights).is_none_or(|facet| dot(facet, normal) > same_side);
     own_normal.is_none_or(|normal| !same(normal))
 }
 
-/// Whether a point is in front of the inside of a facet, or no deeper than it is pressed: then it is met from there,
-/// beside the own body as well.
+/// Whether a point is in front of the inside of a facet, or behind it by at most a typical penetration. Then they are
+/// in contact even beside the point's own body.
 fn is_over((shape, foot): &(Shape, Foot), p: Point) -> bool {
-    /// Depth in shares of the facet.
+    /// Depth as a share of the facet.
     const PRESSED: f64 = 0.05;
     let height = |normal: Point| dot(normal, sub(p, foot.point));
     foot.location == Location::Inside
@@ -330,19 +334,19 @@ fn is_over((shape, foot): &(Shape, Foot), p: Point) -> bool {
 }
 
 impl Stand {
-    /// Whether the node stands on the facet along its own normal, not over a side or a vertex.
+    /// Whether the projection is along the facet's own normal, not at a side or a vertex.
     pub(super) fn is_inside(&self) -> bool {
         self.location == Location::Inside
     }
 
-    /// The stand that takes the place of this one when the node is found as in `next` at t; none if this one stays.
+    /// The projection that replaces this one when the node is found as in `next` at time t; none if this one stays.
     ///
-    /// It stays if the node has jumped too often: between two facets, or around an edge that it touches, there is no
-    /// normal to converge to. It also stays if a kink lies between two places of a step: rows are followed in turns to
-    /// where the balance holds and, later in the step, to where the gap is met, and the row of the later one then
-    /// serves both.
+    /// It stays if the node has jumped too often: between two facets, or around an edge that it touches, the normal
+    /// does not converge. It also stays if a kink lies between the two times of a step: rows are evaluated in turn
+    /// where the balance holds and, later in the step, where the gap is zero. Then the row of the later time serves
+    /// both.
     pub(crate) fn followed_by(&self, next: Self, t: f64) -> Option<Self> {
-        /// Cosines of the angles that are a jump and a kink (18°), and jumps that are followed.
+        /// Cosines of the angles that count as a jump and as a kink (18°), and the number of jumps allowed.
         const TURN: f64 = 1.0 - 1e-5;
         const KINK: f64 = 0.95;
         const PATIENCE: u8 = 8;
@@ -364,20 +368,21 @@ impl Stand {
         Some(Self { jumps: self.jumps.saturating_add(u8::from(jumped)), seen: [Some(now), other], ..next })
     }
 
-    /// d²g/ds² along x + s v, with the node at x of velocity v, and the facet and its vertices' velocities as shapes.
+    /// d²g/ds² along x + s v: the node at x has velocity v; the facet and the velocities of its vertices are given as
+    /// shapes.
     ///
-    /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet's
-    /// there, differentiating r · S,α = 0 gives A ξ̇ = p − g c with p_α = w · S,α, c_α = n · w,α and
-    /// A = S,α · S,β − g n · S,αβ, and the turning of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α
-    /// ξ̇. On a side or a vertex the node also turns around it: w⊥²/g. Closer than a share of the facet that turn is
-    /// over in no time, and the facet stands for the smooth surface that is meant.
+    /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet
+    /// there, differentiating r · S,α = 0 gives A ξ̇ = p − g c with p_α = w · S,α, c_α = n · w,α and A = S,α · S,β −
+    /// g n · S,αβ, and the rate of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α ξ̇. On a side or a
+    /// vertex the node also turns around it: w⊥²/g. If the gap is below a small share of the facet, that turn takes
+    /// almost no time and is left out; the facet then represents a smooth surface.
     pub(crate) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
         const CLOSE: f64 = 1e-3;
         let n = self.normal;
         let arm = add_scaled(x, -1.0, shape.point(&self.weights));
         let w = add_scaled(v, -1.0, velocity.point(&self.weights));
         let gap = dot(n, arm);
-        // The part of a straight line with the tangent s that turns by c.
+        // The contribution of a straight line with the tangent s that turns at rate c.
         let line = |s: Point, c: f64| c * (2.0 * dot(w, s) - gap * c) / dot(s, s);
         match self.location {
             Location::Vertex(_) if gap.abs() > CLOSE * shape.size() => {
@@ -403,7 +408,7 @@ impl Stand {
                     let determinant = ss * tt - st * st;
                     [(tt * b[0] - st * b[1]) / determinant, (ss * b[1] - st * b[0]) / determinant]
                 };
-                // At a focus of a warped facet the closest point is lost; what is left is the flat facet.
+                // At a focus of a warped facet the closest point is not unique. The facet is taken as flat there.
                 let curved = st - gap * twist;
                 let convex = ss * tt - curved * curved > 1e-3 * (ss * tt - st * st);
                 let (curved, twist) = if convex { (curved, twist) } else { (st, 0.0) };

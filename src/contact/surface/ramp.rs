@@ -17,7 +17,7 @@ impl Default for Ramp {
 }
 
 impl Ramp {
-    /// Refuses what is not finite, and an end that is not after the beginning.
+    /// Rejects values that are not finite, and an end that is not after the beginning.
     pub(crate) fn new(times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
         if let Some(&time) = times.iter().find(|time| !time.is_finite()) {
@@ -32,7 +32,7 @@ impl Ramp {
         Ok(Self { times, factors })
     }
 
-    /// How far from the beginning to the end t is, from 0 to 1.
+    /// The elapsed share of the ramp at t, from 0 to 1.
     fn place(&self, t: f64) -> f64 {
         ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0)
     }
@@ -42,13 +42,13 @@ impl Ramp {
         self.factors
     }
 
-    /// How its rate changes in time.
+    /// The second time derivative of the factor.
     pub(crate) fn acceleration(&self, t: f64) -> f64 {
         let ([from, to], s) = (self.factors, self.place(t));
         60.0 * (to - from) / (self.times[1] - self.times[0]).powi(2) * s * (1.0 - s) * (1.0 - 2.0 * s)
     }
 
-    /// How the factor changes in time.
+    /// The time derivative of the factor.
     pub(crate) fn rate(&self, t: f64) -> f64 {
         let ([from, to], s) = (self.factors, self.place(t));
         30.0 * (to - from) / (self.times[1] - self.times[0]) * (s * (1.0 - s)).powi(2)

@@ -1,4 +1,4 @@
-//! How far a search of two surfaces looks, and how long what it has listed holds.
+//! The range of a search between two surfaces, and how long its lists are valid.
 
 use super::nodes::Nodes;
 use super::search::Bounds;
@@ -6,15 +6,15 @@ use super::shape::{Point, sub};
 use crate::error::{Result, positive};
 use crate::real::Real;
 
-/// The least distance at which surfaces are found, and where they were when lists of what is near were built.
+/// The least distance at which surfaces are found, and the nodal positions when the lists of near facets were built.
 #[derive(Debug)]
 pub(crate) struct Reach {
     least: f64,
-    /// How far surfaces may move against each other before lists are built anew; if none, half of what is searched.
+    /// Relative motion of the surfaces after which lists are rebuilt; if none, half of the search range.
     skin: Option<f64>,
-    /// Up to which distance the lists hold all, where they were built.
+    /// Distance up to which the lists were complete when they were built.
     listed: f64,
-    /// Positions there, by node; none without lists.
+    /// Nodal positions when the lists were built; empty without lists.
     built_at: Vec<Point>,
 }
 
@@ -40,17 +40,17 @@ impl Reach {
         Ok(())
     }
 
-    /// Lists are no longer valid.
+    /// Marks the lists as invalid.
     pub(crate) fn forget(&mut self) {
         self.built_at.clear();
     }
 
-    /// Up to which distance lists hold all, where they were built.
+    /// Distance up to which the lists were complete when they were built.
     pub(crate) fn listed(&self) -> f64 {
         self.listed
     }
 
-    /// The boxes of what the nodes of either body have moved since lists were built; empty without lists.
+    /// The boxes of the motions of the nodes of either body since the lists were built; empty without lists.
     pub(crate) fn motions(&self, nodes: &Nodes) -> [Bounds; 2] {
         nodes.bodies().each_ref().map(|body| {
             let moved = |&node: &usize| Some(sub(nodes.positions[node], *self.built_at.get(node)?));
@@ -58,8 +58,8 @@ impl Reach {
         })
     }
 
-    /// The range within which lists must be built anew to hold all within `range`; none if they do, after those
-    /// motions. They are taken as built where the nodes are now.
+    /// If the lists are not complete within `range` after these motions, the range for new ones, which the caller
+    /// builds at the current positions; otherwise none.
     pub(crate) fn renew(&mut self, [one, other]: &[Bounds; 2], range: f64, positions: &[Point]) -> Option<f64> {
         if !self.built_at.is_empty() && range + one.spread(other) <= self.listed {
             return None;
@@ -70,14 +70,14 @@ impl Reach {
         Some(self.listed)
     }
 
-    /// Up to which distance from a node lists hold all now, with the motion of the other body; below zero without
-    /// lists.
+    /// Distance from a node up to which the lists are complete now, given the motion of the other body; negative
+    /// without lists.
     pub(crate) fn known_around(&self, node: usize, position: Point, other: &Bounds) -> f64 {
         self.listed - self.moved(node, position, other)
     }
 
-    /// How far a node has moved since lists were built against the other body, of which this is the box of motions, in
-    /// any coordinate; infinite without lists.
+    /// The largest component of a node's motion relative to the other body since the lists were built; `other` is the
+    /// box of that body's motions. Infinite without lists.
     pub(crate) fn moved(&self, node: usize, position: Point, other: &Bounds) -> f64 {
         let before = self.built_at.get(node);
         before.map_or(f64::INFINITY, |&before| Bounds::of_points([sub(position, before)]).spread(other))

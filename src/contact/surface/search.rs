@@ -1,4 +1,4 @@
-//! Which facets a node may meet: lists kept over many steps, from an R*-tree of the facets' boxes.
+//! The facets that a node may be in contact with: lists kept over many steps, from an R*-tree of the facets' boxes.
 
 use super::shape::{Point, RIM, Shape, norm};
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -13,7 +13,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing.
+    /// The empty box.
     pub(crate) const EMPTY: Self = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
 
     #[inline]
@@ -50,7 +50,7 @@ impl Bounds {
         (0..3).all(|i| self.lower[i] <= other.upper[i] && other.lower[i] <= self.upper[i])
     }
 
-    /// The largest component of the way from a point to the box; zero inside.
+    /// The largest component of the vector from a point to the box; zero inside.
     #[inline]
     pub(crate) fn distance(&self, x: Point) -> f64 {
         (0..3).fold(0.0, |most, i| most.max(self.lower[i] - x[i]).max(x[i] - self.upper[i]))
@@ -61,7 +61,7 @@ impl Bounds {
         (0..3).all(|i| self.lower[i] <= x[i] && x[i] <= self.upper[i])
     }
 
-    /// A bound of |x − y| over x in one box and y in the other.
+    /// A bound of |x − y| for x in one box and y in the other.
     #[inline]
     pub(crate) fn farthest(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
@@ -79,7 +79,7 @@ impl Bounds {
         self.lower.iter().chain(&self.upper).fold(0.0, |largest, x| x.abs().max(largest))
     }
 
-    /// Largest component of x − y over x in one box and y in the other, in either direction.
+    /// Largest component of x − y for x in one box and y in the other, in either direction.
     #[inline]
     pub(crate) fn spread(&self, other: &Self) -> f64 {
         let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
@@ -87,17 +87,17 @@ impl Bounds {
     }
 }
 
-/// How far around a facet a foot can lie beyond its box: the facet goes on a little beyond the rim.
+/// How far beyond the box of a facet its closest points can lie: facets extend a little beyond the rim.
 pub(crate) fn overhang(bounds: &Bounds) -> f64 {
     overhang_of(bounds.extent())
 }
 
-/// The same of a facet by the largest extent of its box.
+/// As [`overhang`], from the longest side of the box.
 pub(super) fn overhang_of(extent: f64) -> f64 {
     8.0 * RIM * extent
 }
 
-/// The facets near each of some boxes: those whose own boxes, widened, met it when the lists were built.
+/// For each of some boxes, the facets whose boxes were within the range when the lists were built.
 #[derive(Debug, Default)]
 pub(crate) struct Neighborhood {
     starts: Vec<usize>,
@@ -105,7 +105,7 @@ pub(crate) struct Neighborhood {
 }
 
 impl Neighborhood {
-    /// Of lists in ascending order.
+    /// From lists in ascending order.
     pub(crate) fn of_lists(lists: impl Iterator<Item = Vec<usize>>) -> Self {
         let mut all = Self { starts: vec![0], facets: Vec::new() };
         for list in lists {
@@ -120,7 +120,7 @@ impl Neighborhood {
         self.of(k).binary_search(&facet).is_ok()
     }
 
-    /// Facets to look at for the k-th box, in ascending order: the result does not depend on the age of the list.
+    /// Candidate facets for the k-th box, in ascending order, so that results do not depend on the age of the list.
     pub(crate) fn of(&self, k: usize) -> &[usize] {
         match self.starts.get(k..k + 2) {
             Some(range) => &self.facets[range[0]..range[1]],
@@ -128,7 +128,7 @@ impl Neighborhood {
         }
     }
 
-    /// Lists anew, for each box, which of the others are within `range` of it.
+    /// Rebuilds the list of the others within `range` of each box.
     pub(crate) fn build(
         &mut self,
         boxes: impl Iterator<Item = Bounds> + Clone,
@@ -147,7 +147,7 @@ impl Neighborhood {
     }
 }
 
-/// Calls `act` for each box with those of the others, in any order, that are within `range` of it.
+/// Calls `act` for each box with the others, in any order, that are within `range` of it.
 pub(super) fn each_near(
     boxes: impl Iterator<Item = Bounds> + Clone,
     others: impl Iterator<Item = Bounds>,

@@ -1,20 +1,20 @@
-//! Second differences of gaps along a straight motion of the nodes: what a gap's acceleration has of its own.
+//! Second differences of gaps along a straight motion of the nodes: the gap acceleration without nodal accelerations.
 
 use super::{Nodes, Point, add_scaled, norm};
 use crate::real::Real;
 use crate::state::resolution;
 
-/// Share of the time ahead by which gaps are differenced: as for gaps whose rates the run finds itself
-/// (`simulation/rows/rate_differences.rs`).
+/// Time increment of the differences, as a share of the time ahead. `simulation/rows/rate_differences.rs` uses the
+/// same.
 const SHARE: f64 = 1.0 / 16.0;
 
-/// Share of the smallest facet that nodes go where nothing is known of a step.
+/// Motion of the fastest node for a difference, as a share of the smallest facet, if the time ahead is not known.
 const WAY: f64 = 1e-3;
 
-/// Roundings of the numbers that a gap is summed from within which a difference is none.
+/// Differences below this many roundings of the summands of a gap count as zero.
 const ROUNDINGS: f64 = 32.0;
 
-/// Gaps before, now and after, and where nodes are there.
+/// Gaps before, now and after, and the nodal positions for them.
 #[derive(Debug, Default)]
 pub(crate) struct SecondDifference {
     positions: Vec<Point>,
@@ -22,10 +22,10 @@ pub(crate) struct SecondDifference {
 }
 
 impl SecondDifference {
-    /// d²g/ds² of the gaps at time t + s and displacements u + s v, for s = 0, by row: calls `gaps` three times, with a
-    /// time and where the nodes of both bodies are then, for a list of gaps (NaN where there is none). `ahead` is the
-    /// time that the last search looks ahead, and `finest` the smallest facet, of which nodes go a share if that is
-    /// zero. Differences that are rounding are zero.
+    /// Calls `act` with each row and d²g/ds² of its gap at time t + s and displacements u + s v, for s = 0. `gaps` is
+    /// called three times with a time and the positions of the nodes of both bodies then, and writes the gaps (NaN
+    /// where there is none). `ahead` is the time that the last search looks ahead. If it is zero, nodes move by a
+    /// share of the smallest facet `finest`. Differences within rounding are zero.
     pub(crate) fn find<T: Real>(
         &mut self,
         nodes: &Nodes,
@@ -41,7 +41,7 @@ impl SecondDifference {
             (false, true) => WAY * finest / fastest,
             (false, false) => 0.0,
         };
-        // A time that t can tell apart.
+        // A time increment that is exact in t.
         let delta = (t + step.max(resolution(t))) - t;
         let mut size = 0.0_f64;
         for (s, list) in [-delta, 0.0, delta].into_iter().zip(&mut self.gaps) {

@@ -1,12 +1,12 @@
-//! Facets of second order: their shape functions on the linear parts that they are cut into.
+//! Facets of second order: their shape functions on the linear parts into which they are cut.
 
 /// Most nodes of a facet of second order.
 const MOST: usize = 9;
 
-/// Numbers by node of a facet: its own nodes, then those of the facet of second order that it is a part of.
+/// Numbers by node of a facet: its own nodes, then the other nodes of its facet of second order.
 pub(crate) type ByNode = [f64; MOST];
 
-/// What a facet of second order is.
+/// The kinds of facets of second order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Segment,
@@ -17,7 +17,7 @@ pub(super) enum Kind {
     Biquadratic,
 }
 
-/// Places of the nodes in each linear part: those of the part, then the others, ascending.
+/// Places of the nodes for each linear part: first the nodes of the part, then the others, ascending.
 const SEGMENT: &[&[usize]] = &[&[0, 2, 1], &[2, 1, 0]];
 const TRIANGLE: &[&[usize]] = &[&[0, 3, 5, 1, 2, 4], &[1, 4, 3, 0, 2, 5], &[2, 5, 4, 0, 1, 3], &[3, 4, 5, 0, 1, 2]];
 const SERENDIPITY: &[&[usize]] = &[
@@ -34,7 +34,8 @@ const BIQUADRATIC: &[&[usize]] = &[
     &[3, 7, 8, 6, 0, 1, 2, 4, 5],
 ];
 
-/// Natural coordinates of the nodes: from −1 to 1 of segments and quadrilaterals, two sides of triangles from 0 to 1.
+/// Natural coordinates of the nodes: from −1 to 1 for segments and quadrilaterals, from 0 to 1 along two sides of
+/// triangles.
 const ON_SEGMENT: &[[f64; 2]] = &[[-1.0, 0.0], [1.0, 0.0], [0.0, 0.0]];
 const ON_TRIANGLE: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]];
 const ON_QUADRILATERAL: &[[f64; 2]] =
@@ -44,10 +45,10 @@ const ON_QUADRILATERAL: &[[f64; 2]] =
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Whole {
     kind: Kind,
-    /// Which part, and its number of nodes.
+    /// Index of the part, and its number of nodes.
     part: u8,
     own: u8,
-    /// The other nodes (the last one fills the rest).
+    /// The other nodes; the last one fills the rest of the array.
     others: [usize; 5],
 }
 
@@ -69,7 +70,7 @@ impl Kind {
         }
     }
 
-    /// The shape function of the node at a place, and its derivatives by the natural coordinates.
+    /// The shape function of the node at a place, and its derivatives with respect to the natural coordinates.
     fn shape(self, place: usize, at: [f64; 2]) -> (f64, [f64; 2]) {
         let node = self.coordinates()[place];
         match self {
@@ -120,7 +121,7 @@ fn serendipity([a, b]: [f64; 2], [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
 }
 
 impl Whole {
-    /// A part of a facet of second order: its nodes, their number, and what it is a part of.
+    /// A part of a facet of second order: its nodes, their number, and the link to the whole facet.
     pub(super) fn part(kind: Kind, part: u8, nodes: &[usize]) -> ([usize; 4], usize, Self) {
         let order = kind.orders()[usize::from(part)];
         let own = match (kind, part) {
@@ -134,7 +135,7 @@ impl Whole {
         (std::array::from_fn(|k| fill(of_part, k)), usize::from(own), whole)
     }
 
-    /// The nodes that are none of the part.
+    /// The nodes of the whole facet that are not nodes of the part.
     pub(super) fn others(&self) -> &[usize] {
         &self.others[..self.order().len() - self.own()]
     }
@@ -147,10 +148,11 @@ impl Whole {
         self.kind.orders()[usize::from(self.part)]
     }
 
-    /// Of the force on a node of the part, the shares that its other nodes get where linear parts take the pressure.
+    /// The shares of the force on a node of the part that move to the other nodes if linear parts bear the pressure.
     ///
-    /// With these the shape functions of nodes in the middle lose to those around them until all have the integrals
-    /// that they have on the parts: the same pressure everywhere makes forces in proportion to the areas.
+    /// With these shares the shape functions of nodes in the middle give to their neighbors until the integral of
+    /// each equals that of the linear shape function on the parts. So a constant pressure makes forces in proportion
+    /// to the areas.
     pub(super) fn given(&self, corner: usize) -> ByNode {
         let order = self.order();
         let at = order[corner];
@@ -171,7 +173,7 @@ impl Whole {
         given
     }
 
-    /// Σ of the natural coordinates of the part's corners.
+    /// Natural coordinates of the point of the part with these shape functions.
     fn place(&self, weights: &[f64; 4]) -> [f64; 2] {
         let corners = &self.order()[..self.own()];
         corners.iter().zip(weights).fold([0.0; 2], |sum, (&corner, weight)| {
@@ -180,7 +182,7 @@ impl Whole {
         })
     }
 
-    /// Its shape functions where those of the part are `weights`.
+    /// The shape functions of the whole facet at the point where those of the part are `weights`.
     pub(crate) fn shapes(&self, weights: &[f64; 4]) -> ByNode {
         let at = self.place(weights);
         let mut shapes = [0.0; MOST];
@@ -190,15 +192,16 @@ impl Whole {
         shapes
     }
 
-    /// What they are beyond those of the part: zero at all nodes, and in the sum.
+    /// The shape functions of the whole facet less those of the part. They are zero at all nodes, and their sum is
+    /// zero.
     pub(crate) fn excess(&self, weights: &[f64; 4]) -> ByNode {
         let mut excess = self.shapes(weights);
         excess.iter_mut().zip(&weights[..self.own()]).for_each(|(shape, weight)| *shape -= weight);
         excess
     }
 
-    /// The derivatives of [`excess`](Self::excess) by the coordinates of the part, `by` being those of its own shape
-    /// functions.
+    /// The derivatives of [`excess`](Self::excess) with respect to the coordinates of the part; `by` are the
+    /// derivatives of the part's own shape functions.
     pub(crate) fn excess_slopes(&self, weights: &[f64; 4], by: &[[f64; 4]; 2]) -> [ByNode; 2] {
         let at = self.place(weights);
         let mut slopes = [[0.0; MOST]; 2];
@@ -240,7 +243,7 @@ mod tests {
                     assert!((difference - slopes[axis]).abs() < 1e-9, "{kind:?} {node} {axis}");
                 }
             }
-            // Constants and linear functions are met.
+            // Constants and linear functions are reproduced.
             let dimension = if kind == Kind::Segment { 1 } else { 2 };
             assert!((sum - 1.0).abs() < 1e-15);
             assert!((0..dimension).all(|axis| (place[axis] - at[axis]).abs() < 1e-15));
@@ -257,7 +260,7 @@ mod tests {
                 let mut all: Vec<usize> = own[..corners].iter().chain(whole.others()).copied().collect();
                 all.sort_unstable();
                 assert_eq!(all, nodes);
-                // At its corners the facet of second order has what the part has.
+                // At its corners the part has the shape functions of the whole facet.
                 for corner in 0..corners {
                     let mut weights = [0.0; 4];
                     weights[corner] = 1.0;

@@ -3,8 +3,8 @@
 /// A point or a vector; in two dimensions the third component is zero.
 pub(crate) type Point = [f64; 3];
 
-/// How far outside an open side of a surface a projection still counts as inside, in shares of the facet: nodes at the
-/// rim of matching meshes must not lose their row to rounding or to a little stretch.
+/// How far outside an open side a projection still counts as inside, as a share of the facet: nodes at the rim of
+/// matching meshes must not lose their row to rounding or a small strain.
 pub(crate) const RIM: f64 = 1e-3;
 
 #[inline]
@@ -40,27 +40,27 @@ pub(crate) fn unit(x: Point) -> Option<Point> {
     (length > 0.0 && length.is_finite()).then(|| [x[0] / length, x[1] / length, x[2] / length])
 }
 
-/// What a facet borders on, by side and by vertex: whether the surface ends there.
+/// The sides and vertices of a facet at which the surface ends.
 ///
 /// Side k runs from vertex k to the next; the sides of a segment are its two vertices.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rim {
     pub(crate) sides: [bool; 4],
     pub(crate) vertices: [bool; 4],
-    /// How far the surface goes on beyond its rim, in shares of the facet: [`RIM`], if not said otherwise.
+    /// Extension of the surface beyond its rim, as a share of the facet; [`RIM`] by default.
     pub(crate) beyond: f64,
 }
 
 /// Where on a facet a closest point lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Location {
-    /// Inside: the node stands on the facet along its normal.
+    /// Inside of the facet, along its normal.
     Inside,
     /// On a side that a neighbor shares.
     Side(usize),
-    /// On a vertex around which the surface is closed.
+    /// On a vertex that is not on the rim.
     Vertex(usize),
-    /// On the rim, and the node stands outside of it.
+    /// On the rim, with the node beyond it.
     Beyond,
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct Foot {
     pub(crate) location: Location,
 }
 
-/// A facet where its vertices are now.
+/// A facet at the current positions of its vertices.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     corners: [Point; 4],
@@ -121,7 +121,7 @@ impl Shape {
         self.corners[k]
     }
 
-    /// Whether the projection of a point is on a segment or a triangle, its sides included up to rounding.
+    /// Whether a point projects onto a segment or a triangle, including its sides up to rounding.
     pub(crate) fn holds(&self, p: Point) -> bool {
         const RIM_OF_RAY: f64 = 1e-9;
         let rim = Rim { sides: [true; 4], vertices: [true; 4], beyond: RIM_OF_RAY };
@@ -196,8 +196,8 @@ impl Shape {
         unit(cross(first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }))
     }
 
-    /// Whether all normals of the facet, going on beyond its sides for a share of itself, are surely within the angle
-    /// of this sine of a unit vector.
+    /// Whether all normals of the facet, extended beyond its sides by `beyond` of its size, are surely within the
+    /// angle of this sine from a unit vector.
     pub(crate) fn is_turned_less(&self, vector: Point, sine: f64, beyond: f64) -> bool {
         let is_within = |product: Point| {
             let turned = cross(vector, product);
@@ -206,8 +206,8 @@ impl Shape {
         self.extreme_products(beyond).into_iter().all(is_within)
     }
 
-    /// Products of the tangents between which, as vectors with positive weights, those of the facet are, which goes on
-    /// beyond its sides for a share of itself: of a quadrilateral the product is bilinear.
+    /// Tangent products whose combinations with positive weights include all tangent products of the facet, extended
+    /// beyond its sides by `beyond` of its size. The product of a quadrilateral is bilinear.
     #[inline]
     pub(super) fn extreme_products(&self, beyond: f64) -> [Point; 4] {
         if self.count < 4 {
@@ -219,7 +219,7 @@ impl Shape {
         std::array::from_fn(|k| cross([lower[0], upper[0]][k / 2], [lower[1], upper[1]][k % 2]))
     }
 
-    /// The tangents where the shape functions are `weights`; the second one of a segment is zero.
+    /// The tangents at the point with these shape functions; the second one of a segment is zero.
     #[inline(always)]
     #[allow(clippy::inline_always)] // at each point of quadrature
     pub(crate) fn tangents_at(&self, weights: &[f64; 4]) -> [Point; 2] {
@@ -230,7 +230,7 @@ impl Shape {
         }
     }
 
-    /// The derivatives of the shape functions of a triangle or a quadrilateral by the parameters of its tangents.
+    /// The derivatives of the shape functions of a triangle or a quadrilateral with respect to its parameters.
     pub(super) fn derivatives(&self, weights: &[f64; 4]) -> [[f64; 4]; 2] {
         if self.count == 3 {
             return [[-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0]];
@@ -240,7 +240,7 @@ impl Shape {
         [[-bottom, bottom, top, -top], [-left, -right, right, left]]
     }
 
-    /// The same along side k.
+    /// The derivatives of the shape functions along side k.
     pub(super) fn along_side(&self, k: usize) -> [f64; 4] {
         let mut along = [0.0; 4];
         along[k] = -1.0;
@@ -248,7 +248,7 @@ impl Shape {
         along
     }
 
-    /// ∂²x/∂ξ∂η of a quadrilateral; the other shapes are flat.
+    /// ∂²x/∂ξ∂η of a quadrilateral; zero for the other shapes.
     #[inline]
     pub(crate) fn twist(&self) -> Point {
         if self.count < 4 {
@@ -279,7 +279,7 @@ impl Shape {
         unit(mean).is_some_and(|mean| (0..self.count).all(|k| dot(mean, corner(k)) > SMALL * size * size))
     }
 
-    /// Whether it has no length or area, or none at one of its corners.
+    /// Whether it has no length or area, or a corner without area.
     pub(crate) fn is_degenerate(&self) -> bool {
         const SMALL: f64 = 1e-10;
         let size = self.size();
@@ -296,7 +296,7 @@ impl Shape {
 
     /// The closest point of the facet; none if the facet is degenerate.
     ///
-    /// Beyond an open side the facet goes on for a share of its extent, so that lever arms stay exact there.
+    /// Beyond an open side the facet is extended by a share of its size, so that lever arms stay exact there.
     pub(crate) fn project(&self, p: Point, rim: Rim) -> Option<Foot> {
         match self.count {
             2 => self.project_on_segment(p, rim),
@@ -341,7 +341,7 @@ impl Shape {
         }
     }
 
-    /// The closest point of the sides. Open sides count only if the node stands outside of them.
+    /// The closest point on the sides. Open sides count only if the node is outside of them.
     fn nearest_on_sides(&self, p: Point, rim: Rim, outside: [bool; 4]) -> Option<Foot> {
         let mut best: Option<Foot> = None;
         for k in (0..self.count).filter(|&k| outside[k] || !rim.sides[k]) {
@@ -413,13 +413,13 @@ impl Shape {
         }
     }
 
-    /// Natural coordinates of the closest point of the parallelogram that has the middle and the tangents there; none
-    /// unless the facet is so nearly this parallelogram that, within `extent` times its natural coordinates, the
-    /// distance from p has one minimum.
+    /// Natural coordinates of the closest point of the parallelogram with the same middle and tangents there; none
+    /// unless the facet is so close to this parallelogram that the distance from p has one minimum within `extent`
+    /// times the natural coordinates.
     ///
-    /// With λ the least eigenvalue of the metric, t the twist and d the distance of p, points Δ away from the closest
-    /// one are √λ |Δ| away along the facet, less a little by t, and |t| |Δ|²/2 at most off its tangent plane: they are
-    /// farther from p if d |t| is small beside λ.
+    /// Let λ be the least eigenvalue of the metric, t the twist and d the distance of p. A point at Δ from the
+    /// closest one is about √λ |Δ| away from it along the facet, and at most |t| |Δ|²/2 off its tangent plane. So it
+    /// is farther from p if d |t| is small compared with λ.
     fn start_if_nearly_flat(&self, p: Point, extent: f64) -> Option<[f64; 2]> {
         const TWIST: f64 = 0.02;
         const BEND: f64 = 0.1;
@@ -435,7 +435,7 @@ impl Shape {
         Some(z.map(|z| z.clamp(-1.0, 1.0)))
     }
 
-    /// Natural coordinates of the closest point of the two triangles that the first diagonal makes.
+    /// Natural coordinates of the closest point on the two triangles that the first diagonal forms.
     fn start(&self, p: Point) -> [f64; 2] {
         let [x0, x1, x2, x3] = self.corners;
         let closed = Rim::default();
@@ -454,12 +454,12 @@ impl Shape {
         best.map_or([0.0; 2], |(_, weights)| Self::coordinates(&weights).map(|z| z.clamp(-1.0, 1.0)))
     }
 
-    /// Minimum of ½|p − x(ξ, η)|² in a box by Newton's method, with bounds as an active set and descent enforced; none
+    /// Minimum of ½|p − x(ξ, η)|² in a box by Newton's method with an active set of bounds and enforced descent; none
     /// if it does not converge.
     fn minimize_distance(&self, p: Point, start: [f64; 2], lower: [f64; 2], upper: [f64; 2]) -> Option<[f64; 2]> {
         const ITERATIONS: usize = 60;
         const TINY: f64 = 1e-7;
-        // Steps made after convergence is in sight: one squares the error, one more settles the last digits.
+        // Iterations after convergence is detected: one squares the error, one more settles the last digits.
         const POLISH: usize = 3;
         let twist = self.twist();
         let (mut z, mut polished) = (start, 0);
@@ -496,7 +496,7 @@ impl Shape {
             let mut share = 1.0;
             let mut next = moved(share);
             let length = |next: [f64; 2]| (next[0] - z[0]).abs().max((next[1] - z[1]).abs());
-            // Rounding hides the descent of the last steps, which are the best ones.
+            // Rounding hides the descent of the last iterations, which are the most accurate ones.
             while length(next) > TINY && {
                 let r = residual(next);
                 dot(r, r) > value
@@ -516,7 +516,7 @@ impl Shape {
 }
 
 impl Foot {
-    /// Closer, or as close and not outside of the rim.
+    /// Closer, or as close and not beyond the rim.
     #[allow(clippy::float_cmp)] // a tie between two facets that share the point
     pub(crate) fn is_better_than(&self, other: &Self) -> bool {
         self.distance < other.distance
@@ -530,7 +530,7 @@ impl Foot {
 mod tests {
     use super::*;
 
-    /// Values from −1 to 1 that look like chance.
+    /// Pseudorandom values from −1 to 1.
     fn noise(k: usize) -> f64 {
         let x = (k as f64 * 12.9898).sin() * 43_758.545_3;
         2.0 * (x - x.floor()) - 1.0

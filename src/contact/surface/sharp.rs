@@ -1,11 +1,11 @@
-//! Where the surface of a body is sharp: nodes of convex edges, and corners in two dimensions.
+//! Sharp parts of a surface: nodes of convex edges, or corners in two dimensions.
 
 use super::Surface;
 use super::shape::{Point, cross, dot, norm, sub};
 
 impl Surface {
-    /// The nodes of sides around which the surface turns by more than `angle` to a convex one, ascending; where the
-    /// surface ends it is not known how it goes on.
+    /// The nodes of convex edges around which the surface turns by more than `angle`, ascending. Edges where the
+    /// surface ends do not count.
     pub(crate) fn sharp_nodes(&self, angle: f64, positions: &[Point]) -> Vec<usize> {
         let mut sharp = Vec::new();
         for (index, facet) in self.facets().iter().enumerate() {

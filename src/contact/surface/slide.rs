@@ -1,4 +1,4 @@
-//! How the closest point of a facet slides as the node and the facet move: what a varying offset adds to rows and
+//! How the closest point of a facet slides as the node and the facet move: the effect of varying offsets on rows and
 //! rates.
 
 use super::projection::{Ground, Stand};
@@ -6,23 +6,24 @@ use super::shape::{Location, Point, Shape, add_scaled, dot};
 
 /// The sum of the offsets of a node and of the closest point of a facet, without its factor.
 ///
-/// With r = g n from the closest point S(ξ) to the node, w its velocity against the point of the facet that is there,
-/// r · S,α = 0 gives A ξ̇ = w · S,α + g n · Ṡ,α, A = S,α · S,β − g n · S,αβ. The offset o(ξ) of the facet changes by
-/// o,α ξ̇_α = y · (w · S,α + g n · Ṡ,α), A y = o,α.
+/// With r = g n from the closest point S(ξ) to the node and w its velocity relative to the facet there, r · S,α = 0
+/// gives A ξ̇ = w · S,α + g n · Ṡ,α with A = S,α · S,β − g n · S,αβ. The rate of the facet's offset o(ξ) is
+/// o,α ξ̇_α = y · (w · S,α + g n · Ṡ,α) with A y = o,α.
 struct Slide {
-    /// S,α and o,α of one or two parameters of the facet (the second ones zero if it is one), and o,12.
+    /// S,α and o,α for one or two parameters of the facet (zero for a missing second one), and o,12.
     tangents: [Point; 2],
     slopes: [f64; 2],
     bend: f64,
     /// S,12, and the matrix A by its entries 11, 12 and 22.
     twist: Point,
     matrix: [f64; 3],
-    /// The derivatives of the shape functions by the parameters.
+    /// The derivatives of the shape functions with respect to the parameters.
     derivatives: [[f64; 4]; 2],
 }
 
 impl Slide {
-    /// None where the offset is the same all over the facet, or the closest point stays: then nothing is added.
+    /// None where the offset is constant on the facet, or the closest point is a vertex: then the offset does not
+    /// slide.
     fn new(stand: &Stand, shape: &Shape, offsets: [f64; 4]) -> Option<Self> {
         let outside = Shape::new(offsets.map(|offset| [offset, 0.0, 0.0]), shape.corners().len());
         let on_line = |tangent: Point, slope: f64, derivatives: [f64; 4]| Self {
@@ -42,7 +43,7 @@ impl Slide {
                     (shape.tangents_at(&stand.weights), outside.tangents_at(&stand.weights).map(|slope| slope[0]));
                 let (ss, st, tt) = (dot(s, s), dot(s, t), dot(t, t));
                 let curved = st - stand.distance * dot(stand.normal, shape.twist());
-                // (As for the acceleration of gaps: at a focus of a warped facet what is left is the flat one.)
+                // As for the acceleration of gaps, the facet is taken as flat at a focus of a warped facet.
                 let convex = ss * tt - curved * curved > 1e-3 * (ss * tt - st * st);
                 let (st, twist) = if convex { (curved, shape.twist()) } else { (st, [0.0; 3]) };
                 Self {
@@ -65,7 +66,7 @@ impl Slide {
         [(tt * b[0] - st * b[1]) / determinant, (ss * b[1] - st * b[0]) / determinant]
     }
 
-    /// The derivatives of the offset by the positions of the node and of the vertices.
+    /// The derivatives of the offset with respect to the positions of the node and of the vertices.
     fn gradient(&self, stand: &Stand) -> [Point; 5] {
         let [y, z] = self.solve(self.slopes);
         let along = add_scaled(self.tangents[0].map(|x| y * x), z, self.tangents[1]);
@@ -77,10 +78,10 @@ impl Slide {
         gradient
     }
 
-    /// The first two derivatives in time of the offset as node and facet move straight on, at the velocity w of the
-    /// node against the closest point and those Ṡ,α and Ṡ,12 of the facet.
+    /// The first two time derivatives of the offset as node and facet move at constant velocities: w of the node
+    /// relative to the closest point, Ṡ,α and Ṡ,12 of the facet.
     ///
-    /// Differentiated once more, with ṙ = w − S,β ξ̇_β, the condition on the closest point gives
+    /// Differentiating the condition on the closest point once more, with ṙ = w − S,β ξ̇_β, gives
     /// A ξ̈ = −(2 Ṡ,β ξ̇_β + S,βγ ξ̇_β ξ̇_γ) · S,α + 2 ṙ · (Ṡ,α + S,αβ ξ̇_β) + 2 r · Ṡ,αβ ξ̇_β.
     fn rates(&self, stand: &Stand, w: Point, rates: [Point; 2], twisting: Point) -> [f64; 2] {
         let Self { tangents: [s, t], slopes, bend, twist, .. } = *self;
@@ -98,8 +99,8 @@ impl Slide {
 }
 
 impl Ground<'_> {
-    /// The derivatives of the sum of the offsets that a stand has, in full size, by the positions of its node and of
-    /// the vertices of its facet; none if they are zero.
+    /// The derivatives of the sum of the offsets of a projection, at full size, with respect to the positions of its
+    /// node and of the vertices of its facet; none if they are zero.
     pub(crate) fn slope(&self, stand: &Stand) -> Option<[Point; 5]> {
         if self.offsets.is_none() {
             return None;
@@ -111,8 +112,9 @@ impl Ground<'_> {
 }
 
 impl Stand {
-    /// The first two derivatives in time of the sum of its offsets, in full size, as all moves straight on from where
-    /// it stands: the velocity of the node, the facet and the velocities of its vertices, and offsets of these.
+    /// The first two time derivatives of the sum of the offsets, at full size, as node and facet move at constant
+    /// velocities: the velocity of the node, the facet and the velocities of its vertices, and the offsets of the
+    /// vertices.
     pub(crate) fn sliding(&self, v: Point, (shape, velocity): (&Shape, &Shape), offsets: [f64; 4]) -> [f64; 2] {
         let Some(slide) = Slide::new(self, shape, offsets) else { return [0.0; 2] };
         let w = add_scaled(v, -1.0, velocity.point(&self.weights));

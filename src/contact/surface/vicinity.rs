@@ -1,4 +1,5 @@
-//! How far a constraint between surfaces looks: its reach, what surfaces are thick, and what is not met within it.
+//! The search settings of a constraint between surfaces: its reach, offsets, and the facets and depths without
+//! contact.
 
 use super::Surface;
 use super::kin::Kin;
@@ -14,22 +15,22 @@ use crate::real::Real;
 pub(crate) struct Vicinity {
     pub(crate) reach: Reach,
     pub(crate) thickness: Thickness,
-    /// What is not met of a surface against itself, once it was asked for.
+    /// For a surface against itself, the facets excluded for each node; none before they are needed.
     pub(crate) kin: Option<Kin>,
-    /// The material behind both surfaces, of one against itself once: none before it was asked for.
+    /// The material behind both surfaces (one entry for a surface against itself); empty before it is needed.
     pub(crate) material: Vec<Material>,
-    /// Of a surface against itself how many rings of facets around a node it does not meet.
+    /// For a surface against itself, the number of rings of facets around a node that are excluded.
     rings: Option<usize>,
 }
 
 impl Vicinity {
-    /// Of two surfaces without offsets.
+    /// For two surfaces without offsets.
     pub(crate) fn new(reach: f64) -> Self {
         let (reach, thickness) = (Reach::new(reach), Thickness::default());
         Self { reach, thickness, kin: None, material: Vec::new(), rings: None }
     }
 
-    /// That of a surface against itself: but for one ring.
+    /// For a surface against itself, with one ring excluded.
     pub(crate) fn of_itself(reach: f64) -> Self {
         Self { rings: Some(1), ..Self::new(reach) }
     }
@@ -38,8 +39,8 @@ impl Vicinity {
         self.rings.is_some()
     }
 
-    /// Finds what nodes do not meet, unless it is known: of two surfaces (of one against itself the first counts) whose
-    /// nodes are those of the two bodies.
+    /// Finds the excluded facets and the material, unless they are known. The nodes of the two surfaces are those of
+    /// the two bodies; for a surface against itself only the first surface counts.
     pub(crate) fn prepare(&mut self, surfaces: &[&Surface], bodies: &[Vec<usize>; 2], coordinates: &[Point]) {
         if !self.material.is_empty() {
             return;
@@ -52,8 +53,8 @@ impl Vicinity {
         }
     }
 
-    /// The material behind the nodes of a pass, whose facets are those of the first surface in the first one, and
-    /// behind these; none if one of both is not known.
+    /// The material behind the nodes of a pass, and behind its facets; none if one of them is not known. In pass 0
+    /// the facets are those of the first surface.
     pub(crate) fn material_of(&self, pass: usize) -> Option<[&Material; 2]> {
         match &self.material[..] {
             [itself] if self.is_of_itself() => Some([itself; 2]),
@@ -63,20 +64,20 @@ impl Vicinity {
         }
     }
 
-    /// What is known no longer holds.
+    /// Drops all lists that depend on the settings.
     pub(crate) fn forget(&mut self) {
         self.reach.forget();
         self.kin = None;
         self.material.clear();
     }
 
-    /// How many rings of facets around a node it does not meet, of a surface against itself.
+    /// Sets the number of rings of facets around a node that are excluded, for a surface against itself.
     pub(crate) fn set_rings(&mut self, rings: usize) {
         self.rings = self.rings.map(|_| rings);
         self.forget();
     }
 
-    /// Takes one offset a node; refuses lists of another length, and what is not finite.
+    /// Sets one offset per node. Rejects lists of another length and values that are not finite.
     pub(crate) fn set_offsets<T: Real>(&mut self, offsets: &[T], nodes: usize) -> Result<()> {
         self.thickness.set(offsets, nodes)?;
         self.forget();
@@ -90,7 +91,7 @@ impl Vicinity {
         Ok(())
     }
 
-    /// The least distance at which surfaces are found.
+    /// Sets the least distance at which surfaces are found.
     pub(crate) fn set_least<T: Real>(&mut self, reach: T) -> Result<()> {
         self.reach.set_least(reach)?;
         self.forget();
