@@ -1,4 +1,4 @@
-//! Contact constraints: where the gap is, which way it pushes, under which law.
+//! Contact constraints: gaps, normals and contact laws.
 
 #[cfg(feature = "search")]
 mod affine_rows;
@@ -64,8 +64,7 @@ pub use crate::contact_id::ContactId;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Refuses lists of a mesh that differ in length or hold coordinates that are not numbers, and nodes that it does not
-/// have.
+/// Rejects mesh lists that differ in length or hold coordinates that are not finite, and nodes that do not exist.
 fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D]], nodes: &[usize]) -> Result<()> {
     let count = coordinates.len();
     if dofs.len() != count {
@@ -75,7 +74,7 @@ fn check_mesh<T: Real, const D: usize>(coordinates: &[[T; D]], dofs: &[[usize; D
     check_nodes("a contact node (at most)", nodes, count)
 }
 
-/// Refuses coordinates that are not numbers.
+/// Rejects coordinates that are not finite.
 fn check_coordinates<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<()> {
     for (index, x) in coordinates.iter().enumerate() {
         if let Some(x) = x.iter().find(|x| !x.is_finite()) {
@@ -86,7 +85,7 @@ fn check_coordinates<T: Real, const D: usize>(coordinates: &[[T; D]]) -> Result<
     Ok(())
 }
 
-/// Refuses a vector that has not one entry a dof of its constraint.
+/// Rejects a vector whose length is not the number of dofs of its constraint.
 fn check_local(found: usize, expected: usize) -> Result<()> {
     match found == expected {
         true => Ok(()),
@@ -94,7 +93,7 @@ fn check_local(found: usize, expected: usize) -> Result<()> {
     }
 }
 
-/// Refuses nodes that a mesh of `count` nodes does not have.
+/// Rejects nodes that a mesh of `count` nodes does not have.
 fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> {
     match nodes.iter().find(|&&node| node >= count) {
         Some(&found) => Err(Error::Dimension { what, expected: count.saturating_sub(1), found }),
@@ -102,19 +101,18 @@ fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> 
     }
 }
 
-/// Whether a body that comes with these speeds along two normals presses on them so differently that the impact along
-/// one is not that along the other: the shares of its kinetic energy (`square` is that of its velocity) that a plastic
-/// impact takes differ by more than a tenth.
+/// Whether plastic impacts along two normals would take shares of a body's kinetic energy that differ by more than a
+/// tenth. `speeds` are its velocity components along them, `square` is the square of its velocity.
 pub(crate) fn press_differently(speeds: [f64; 2], square: f64) -> bool {
     (speeds[0] * speeds[0] - speeds[1] * speeds[1]).abs() > 0.1 * square
 }
 
-/// Share of the way that must lead into a body for a contact to be missed if it comes out again: the cosine of the
-/// angle to the inward normal where it enters. An impact below it would have taken a sixteenth of the energy.
+/// A body that enters another and leaves it within a step has missed a contact if the cosine of its direction to the
+/// inward normal at the entry exceeds this. An impact below it would take at most a sixteenth of the energy.
 pub(crate) const STEEP: f64 = 0.25;
 
-/// Cosine of the largest turn of a normal in a step in which its contact presses: 30 degrees.
+/// Cosine of the largest turn of the normal of a closed contact in a step: 30 degrees.
 pub(crate) const LARGEST_TURN: f64 = 0.866;
 
-/// Share of the way in a step by which a gap may miss its linearization, and a node be stopped away from the surface.
+/// Largest error of a linearized gap, and largest gap of a stopped node, as a share of its displacement in the step.
 pub(crate) const LARGEST_MISS: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! Contact of bodies with faces, corners and edges, two or many: the constraints that keep all of them apart.
+//! Contact of two or more bodies with faces, corners and edges: the constraints that keep them apart.
 
 use super::edge_to_edge::{self, EdgeToEdge};
 use super::surface::{Facet, Nodes, Ramp, Surface, Thickness};
@@ -6,35 +6,34 @@ use super::{ContactConstraint, ContactLaw, Mortar, NodeToFacet};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Contact of deforming bodies whose surfaces may have corners and edges, of two ([`new`](Self::new)), or of any number
-/// and of bodies that fold ([`of_itself`](Self::of_itself)): what
-/// [`SimulationBuilder::constraints`](crate::SimulationBuilder::constraints) takes.
+/// Contact of deforming bodies whose surfaces may have corners and edges: of two bodies ([`new`](Self::new)), or of
+/// any number of bodies, which may fold ([`of_itself`](Self::of_itself)). It makes the constraints for
+/// [`SimulationBuilder::constraints`](crate::SimulationBuilder::constraints).
 ///
-/// Weighted gaps spread contact over faces, but facets at more than 60° to each other do not meet: alone they would let
-/// corners and edges penetrate, and the bodies could gain energy when these come out again. A [`Mortar`] alone
-/// therefore refuses surfaces with corners. This is a list of constraints, of which a body has those that its shape
-/// asks for:
+/// Weighted gaps spread contact over faces, but not between facets at more than 60° to each other. Alone they would
+/// let corners and edges penetrate, and the bodies could gain energy from the recovery. Therefore [`Mortar`] rejects
+/// surfaces with corners. This list of constraints contains those that the shape of the bodies needs:
 ///
 /// 1. [`Mortar`] of the whole surfaces;
 /// 2. [`NodeToFacet`] of the slave's nodes at sharp edges (in two dimensions: at sharp corners) with the master's
 ///    facets, and of the master's nodes with the slave's facets;
 /// 3. [`EdgeToEdge`], in three dimensions.
 ///
-/// Of a surface against itself they are [`NodeToFacet::of_itself`], which sees corners and faces, and
-/// [`EdgeToEdge::of_itself`] in three dimensions.
+/// For a surface against itself the constraints are [`NodeToFacet::of_itself`], for corners and faces, and in three
+/// dimensions [`EdgeToEdge::of_itself`].
 ///
-/// Smooth bodies have the first one only, and pay for nothing else. Where a face with its edges lies on a face there
-/// are more rows than independent gaps: the multipliers are then those of least norm, and their sums are what matters.
+/// Smooth bodies have the first one only, without extra cost. Where a face with its edges lies on a face there are
+/// more rows than independent gaps. Then the multipliers have the least norm, and only their sums are meaningful.
 ///
-/// Give the whole surfaces of both bodies, as [`Surface::of_cells`](super::Surface::of_cells) finds them: where a
-/// surface ends it is not known what is behind, and nothing is sharp.
+/// Give the whole surfaces of both bodies, as [`Surface::of_cells`](super::Surface::of_cells) finds them. No edge
+/// counts as sharp where a surface ends, because the surface behind it is unknown.
 ///
 /// # Known failure
 ///
 /// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
-/// - Nodes within faces are kept out in the mean over their facets only, as by [`Mortar`]: by a tenth of an element in
-///   blocks that fall on edges (`docs/contact.md` has a table). Of itself there are no weighted gaps: pressures are
-///   those of nodes on facets.
+/// - As with [`Mortar`], nodes within faces are kept out only in the mean over their facets: they penetrate by a
+///   tenth of an element in blocks that fall on edges (`docs/contact.md` has a table). A surface against itself has
+///   no weighted gaps: its pressures are those of nodes on facets.
 ///
 /// ```
 /// use contact_dynamics::contact::BodyContact;
@@ -71,10 +70,10 @@ use crate::real::Real;
 pub struct BodyContact<T: Real, const D: usize> {
     coordinates: Vec<[T; D]>,
     dofs: Vec<[usize; D]>,
-    /// Facets of the slave and of the master; of a surface against itself all of them, and none.
+    /// Facets of the slave and of the master; for a surface against itself all facets, and none.
     facets: [Vec<Facet>; 2],
     sharp: [Vec<usize>; 2],
-    /// Of a surface against itself, how many rings of facets around a node it does not meet.
+    /// For a surface against itself, the number of rings of facets around a node that are excluded.
     rings: Option<usize>,
     offsets: Option<Vec<T>>,
     ramp: Option<[[f64; 2]; 2]>,
@@ -85,13 +84,13 @@ pub struct BodyContact<T: Real, const D: usize> {
 }
 
 impl<T: Real, const D: usize> BodyContact<T, D> {
-    /// Contact of the whole surfaces of two bodies, by their facets; which of them is the slave of the weighted gaps is
-    /// chosen as for [`Mortar`].
+    /// Contact of the whole surfaces of two bodies, given by their facets. Choose the slave of the weighted gaps as
+    /// for [`Mortar`].
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
-    /// ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
-    /// [`with_law`](Self::with_law) gives another.
+    /// dofs of their displacements. Facets list nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces must not share a node. The law is [`ContactLaw::Rigid`] by default, see
+    /// [`with_law`](Self::with_law).
     ///
     /// # Errors
     ///
@@ -106,10 +105,10 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Self::between(coordinates, dofs, facets, None)
     }
 
-    /// Contact of a surface with itself, of a body that folds or of any number of bodies whose surfaces are given as
-    /// one: every node with all facets that are not around it, and every edge with all edges that are not. Nothing
-    /// needs to be said of who meets whom. What a node or an edge does not meet of its own body is told by
-    /// [`NodeToFacet::of_itself`]; nothing may be inside of itself in the reference configuration.
+    /// Contact of a surface with itself, for a body that folds or for any number of bodies whose surfaces are given
+    /// as one: every node with all facets that are not around it, and every edge with all edges that are not near it
+    /// on its body. No pairs of bodies need to be listed. [`NodeToFacet::of_itself`] describes the facets excluded
+    /// for a node. No body may penetrate itself in the reference configuration.
     ///
     /// Give the whole surfaces, as [`Surface::of_cells`](super::Surface::of_cells) finds them of all bodies at once.
     ///
@@ -164,67 +163,67 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(contact)
     }
 
-    /// How many rings of facets around a node or an edge it does not meet, of [its own surface](Self::of_itself); by
-    /// default 1 ([`NodeToFacet::rings`]). It has no meaning for two surfaces.
+    /// Sets the number of rings of facets around a node or an edge that are excluded for [a surface against
+    /// itself](Self::of_itself); 1 by default ([`NodeToFacet::rings`]). Without effect for two surfaces.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
         self.rings = self.rings.map(|_| rings);
         self
     }
 
-    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: faces by so much
-    /// ([`Mortar::offsets`], [`NodeToFacet::offsets`]), edges and corners rounded with this radius
-    /// ([`EdgeToEdge::offsets`]).
+    /// Sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh. Faces are
+    /// offset by this length ([`Mortar::offsets`], [`NodeToFacet::offsets`]); edges and corners are rounded with this
+    /// radius ([`EdgeToEdge::offsets`]).
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`](crate::Error::Dimension) unless there is one a node of the mesh; the others are those of
-    /// [`constraints`](Self::constraints).
+    /// [`Error::Dimension`](crate::Error::Dimension) unless there is one offset per node of the mesh;
+    /// [`constraints`](Self::constraints) reports the other errors.
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         Thickness::default().set(offsets, self.coordinates.len())?;
         self.offsets = Some(offsets.to_vec());
         Ok(self)
     }
 
-    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time, as [`Mortar::ramp`].
+    /// Scales all [`offsets`](Self::offsets) in time, as [`Mortar::ramp`].
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless all are finite and the second time is later.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless all values are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         Ramp::new(times, factors)?;
         self.ramp = Some([times, factors]);
         Ok(self)
     }
 
-    /// The law of all rows.
+    /// Sets the law of all rows.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0, in all rows.
+    /// Sets Coulomb's friction with a coefficient μ ≥ 0 in all rows.
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
     }
 
-    /// How far (length) outside of each other, and inside, facets and edges meet at least; by default the mean size of
-    /// the facets, of the coarser surface. What the velocities bring near within a step is found as well.
+    /// Sets the least distance (length), outside and inside, at which facets and edges are found; by default the mean
+    /// size of the facets, of the coarser surface. The motion within a step is added by the velocities.
     #[must_use]
     pub fn reach(mut self, reach: T) -> Self {
         self.reach = Some(reach);
         self
     }
 
-    /// What is sharp: sides, in two dimensions nodes, around which a surface turns by more than `angle` (radians,
-    /// between the normals of its facets in the reference coordinates) to a convex one; 30° if not given.
+    /// Sets the angle (radians) from which convex sides, or nodes in two dimensions, are sharp: the angle between the
+    /// normals of their facets in the reference configuration; 30° by default.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless from 0 to π.
+    /// [`Error::Parameter`](crate::Error::Parameter) unless the angle is from 0 to π.
     pub fn sharp(mut self, angle: f64) -> Result<Self> {
         edge_to_edge::check_angle(angle)?;
         self.angle = angle;
@@ -232,8 +231,8 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(self)
     }
 
-    /// The nodes at sharp edges and corners of the slave, and of the master, ascending; of a surface against itself the
-    /// same list twice.
+    /// The nodes at sharp edges and corners of the slave, and of the master, ascending; for a surface against itself
+    /// the same list twice.
     pub fn sharp_nodes(&self) -> &[Vec<usize>; 2] {
         &self.sharp
     }
@@ -252,9 +251,9 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(())
     }
 
-    /// The constraints, in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's on
-    /// the slave's, edges on edges; of a surface against itself nodes on facets, edges on edges. What a body has
-    /// nothing for is left out.
+    /// The constraints in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's
+    /// sharp nodes on the slave's facets, edges on edges. For a surface against itself: nodes on facets, edges on
+    /// edges. Constraints for which a body has no sharp nodes or edges are left out.
     ///
     /// # Errors
     ///
@@ -286,7 +285,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(constraints)
     }
 
-    /// One of the constraints with what it is given.
+    /// Applies the settings to one of the constraints.
     fn given<C: Part<T>>(&self, part: C) -> Result<C> {
         let mut part = part.with_law(self.law).friction(self.friction);
         if let Some(reach) = self.reach {
@@ -302,7 +301,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     }
 }
 
-/// What all constraints of the list take.
+/// The settings that all constraints of the list have.
 trait Part<T: Real>: Sized {
     fn with_law(self, law: ContactLaw) -> Self;
     fn friction(self, coefficient: f64) -> Self;

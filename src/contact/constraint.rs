@@ -1,19 +1,19 @@
-//! The trait of contact constraints, and what a constraint is asked and shown.
+//! The trait of contact constraints, and the data passed to and returned by a constraint.
 
 use super::{ContactId, Contacts, GapRates};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// A constraint `g(t, u) ≥ 0` (or = 0) on some displacements, with as many rows as it has candidates.
+/// A constraint `g(t, u) ≥ 0` (or = 0) on some displacements, with one row per candidate.
 ///
-/// Like an element a constraint knows its own dofs alone: [`dofs`](Self::dofs) lists them once, and every vector that
-/// it is given has one entry for each of them, in this order. Rows name *places* in that list.
+/// As an element, a constraint has its own list of dofs: [`dofs`](Self::dofs) returns it once, and every vector that
+/// is passed to the constraint has one entry for each of them, in this order. Rows refer to *places* in that list.
 ///
-/// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow); gaps are evaluated anywhere,
+/// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow). Gaps are evaluated for any u,
 /// exactly or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on
 /// the system is Gᵀ λ, λ > 0 in compression.
 ///
-/// The end of a bar against a wall that moves (13 lines):
+/// The end of a bar against a moving wall (13 lines):
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts};
@@ -75,35 +75,35 @@ use crate::real::Real;
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub trait ContactConstraint<T: Real>: Send {
-    /// The dofs of the system (in any order, none twice) that contacts may ever act on or read, whatever later searches
-    /// find. Asked once, when a simulation is built, before anything else.
+    /// The dofs of the system (in any order, none twice) on which contacts of this constraint may ever act, or which
+    /// it reads. Called once, when a simulation is built, before any other method.
     ///
-    /// The solver eliminates those that contacts may act on last, so that contact works on them alone.
+    /// The solver eliminates the dofs on which contacts may act last, so that the contact problem involves only them.
     fn dofs(&self) -> &[usize];
 
-    /// Whether no row will ever act on the dof at a place of [`dofs`](Self::dofs): the constraint reads it, and the
-    /// solver need not treat it as a dof of contact. Asked after `dofs`. Default: rows may act on all.
+    /// Whether no row will ever act on the dof at a place of [`dofs`](Self::dofs): then the constraint only reads it,
+    /// and the solver need not treat it as a dof of contact. Called after `dofs`. Default: rows may act on all dofs.
     fn only_reads(&self, place: usize) -> bool {
         let _ = place;
         false
     }
 
-    /// Says everything of all candidates there are now, one [`Contacts::push`] each: name, law, row of G, and more if
-    /// there is more to say. Called after a search or a follow that has found a change.
+    /// Lists all current candidates, with one [`Contacts::push`] each: name, law, row of G, and optional data. Called
+    /// after a search or a follow that reports a change.
     fn contacts(&self, contacts: &mut Contacts<T>);
 
-    /// The gaps at t and u, one a candidate (length). Not called while there are no candidates.
+    /// The gaps at t and u, one per candidate (length). Not called without candidates.
     ///
     /// # Errors
     ///
-    /// The host's own, as [`Error::Host`]. (Gaps that are NaN or infinite are refused by the caller.)
+    /// The host's own, as [`Error::Host`]. The caller rejects gaps that are NaN or infinite.
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()>;
 
-    /// The parts of ġ and g̈ that do not come from v and a, one a candidate. Default: they are found from
-    /// [differences](Rates::Differences) of the gaps.
+    /// The parts of ġ and g̈ that do not come from v and a, one entry per candidate. Default: the caller finds them
+    /// by [differences](Rates::Differences) of the gaps.
     ///
-    /// A constraint that gives them must give those of all its candidates: a gap that changes in time while its rates
-    /// are zero is refused ([`Error::SilentMotion`]).
+    /// A constraint that returns rates must return them for all its candidates. If a gap changes in time while its
+    /// rates are zero, the run fails with [`Error::SilentMotion`].
     ///
     /// # Errors
     ///
@@ -113,12 +113,12 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Rates::Differences)
     }
 
-    /// The parts of the slip, and of its rate, that do not come from v and a, one entry a tangent, in the order in
-    /// which [`contacts`](Self::contacts) gives them: slip = H v + `rate`, and where contact sticks H a +
-    /// `acceleration` = 0. For an obstacle whose points at the contact move with velocity w and acceleration b these
-    /// are −t·w and −t·b, t the direction of the tangent. Asked of constraints with
-    /// [friction](super::Contact::friction) only. Default: [`Rates::Zero`], as of obstacles at rest, and of bodies
-    /// whose dofs are all in H. ([`Rates::Differences`] is no answer here.)
+    /// The parts of the slip and of its rate that do not come from v and a, one entry per tangent, in the order of
+    /// [`contacts`](Self::contacts): slip = H v + `rate`, and in stick H a + `acceleration` = 0. For an obstacle
+    /// whose points at the contact move with velocity w and acceleration b these are −t·w and −t·b, with the
+    /// direction t of the tangent. Called only for constraints with [friction](super::Contact::friction). Default:
+    /// [`Rates::Zero`], for obstacles at rest and for bodies whose dofs are all in H. [`Rates::Differences`] is not
+    /// allowed here.
     ///
     /// # Errors
     ///
@@ -128,12 +128,12 @@ pub trait ContactConstraint<T: Real>: Send {
         Ok(Rates::Zero)
     }
 
-    /// Finds the candidates near the state at t, once a step; they may change only here. Default: they never change,
-    /// and their rows [follow](Self::follow) u.
+    /// Finds the candidates near the state at t, once a step; candidates may change only here. Default: they never
+    /// change, and their rows [follow](Self::follow) u.
     ///
-    /// `ahead` (time) is how far from t on contact is looked at before the next search: the step that begins, and what
-    /// the scheme looks ahead beyond it; zero where no step does. A constraint that takes only what is near takes at
-    /// least what v brings near in that time. Returns whether candidates or rows changed since the last call.
+    /// `ahead` is the time from t within which contact is evaluated before the next search: the coming step, and the
+    /// time that the scheme looks ahead beyond it; zero if there is no step. A constraint with a search range must
+    /// include the motion by v within that time. Returns whether candidates or rows changed since the last call.
     ///
     /// # Errors
     ///
@@ -143,46 +143,45 @@ pub trait ContactConstraint<T: Real>: Send {
         self.follow(t, u)
     }
 
-    /// Moves the linearization of the candidates there are to u: rows are then the derivatives of the gaps at u. Called
-    /// within a step, between two searches, any number of times and for several u; candidates and their order stay as
-    /// they are. Default: rows do not depend on u, nothing moves.
+    /// Linearizes the existing candidates at u: rows are then the derivatives of the gaps at u. Called within a step,
+    /// between two searches, any number of times and for several u. Candidates and their order stay. Default: rows do
+    /// not depend on u.
     ///
     /// Returns whether rows changed.
     ///
     /// # Errors
     ///
-    /// [`Error::ContactLost`] if a candidate has left what the last search knows of its surroundings,
-    /// [`Error::ContactNotFinite`] if it has no normal there (the constraint's index in the contact's name is filled in
-    /// by the caller), or the host's own.
+    /// [`Error::ContactLost`] if a candidate has left the range of the last search, [`Error::ContactNotFinite`] if it
+    /// has no normal there (the caller sets the constraint's index in the contact's name), or the host's own.
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         let _ = (t, u);
         Ok(Candidates::Unchanged)
     }
 
-    /// Looks at a step before it is accepted: bodies that have gone through each other are refused here, or contacts
-    /// found along a normal that is not that of the place where they happen. Candidates are those of the search at the
-    /// start of the step. Default: nothing is refused.
+    /// Checks a step before it is accepted. It is rejected here if bodies have gone through each other, or if a
+    /// contact was found along a normal that differs from the normal where it occurs. Candidates are those of the
+    /// search at the start of the step. Default: every step is accepted.
     ///
     /// # Errors
     ///
-    /// [`Error::PassedThrough`], which a smaller step mends (the constraint's index in the contact's name is filled in
-    /// by the caller), or the host's own.
+    /// [`Error::PassedThrough`], for which a smaller step helps (the caller sets the constraint's index in the
+    /// contact's name), or the host's own.
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let _ = step;
         Ok(())
     }
 
-    /// Whether [`inspect`](Self::inspect) looks at anything, asked after the first search: one that does not saves the
-    /// copying of its vectors. Default: it does.
+    /// Whether [`inspect`](Self::inspect) checks anything; if not, its vectors are not copied. Called after the first
+    /// search. Default: yes.
     fn inspects(&self) -> bool {
         true
     }
 
-    /// Which of its bonds do not stand the forces at the end of a step: rows that hold both ways until their force is
-    /// too large. `forces` has one entry a candidate, after correction (compression positive). Appends the
-    /// [feature](super::ContactId::feature) of each bond that breaks, and how many times as large as its strength the
-    /// force is. Asked once for each step that is accepted, after everything that may refuse it. Default: there is no
-    /// bond.
+    /// Finds the bonds that break under the forces at the end of a step. A bond is a row that holds in both
+    /// directions until its force is too large. `forces` has one entry per candidate, after correction (compression
+    /// positive). Appends the [feature](super::ContactId::feature) of each bond that breaks, and the ratio of its
+    /// force to its strength. Called once for each accepted step, after all checks that may reject it. Default: there
+    /// is no bond.
     ///
     /// ```
     /// use contact_dynamics::contact::{BondStrength, ContactConstraint, LinearRows};
@@ -199,24 +198,24 @@ pub trait ContactConstraint<T: Real>: Send {
         let _ = (forces, broken);
     }
 
-    /// Is told which of its bonds are broken: their features, ascending, of all that have broken so far. Rows change
-    /// with the next search. Called when a run is built, before its first search, with what the state that it continues
-    /// from knows (nothing at a start), and after each step that has broken one. That the constraint remembers this is
-    /// no state of its own: it is that of the run ([`State::broken_bonds`](crate::State::broken_bonds)). Default:
+    /// Sets the broken bonds: the features of all bonds that have broken so far, ascending. Rows change with the next
+    /// search. Called when a run is built, before its first search, with the broken bonds of the initial state (none
+    /// for a new run), and after each step that breaks a bond. The list belongs to the state of the run
+    /// ([`State::broken_bonds`](crate::State::broken_bonds)); the constraint only keeps a copy. Default: does
     /// nothing, as there is no bond.
     fn set_broken(&mut self, features: &[usize]) {
         let _ = features;
     }
 
-    /// When rows may change, asked after the first search: a run in which none follows saves the looking. Default:
-    /// nothing is known.
+    /// When rows may change. Called after the first search: a run without rows that follow u skips the calls.
+    /// Default: rows may follow u.
     fn variation(&self) -> Variation {
         Variation::Follows
     }
 }
 
 impl<T: Real> Contacts<T> {
-    /// What a constraint says now, for hosts that look at a constraint themselves.
+    /// The current candidates of a constraint, for hosts that call a constraint themselves.
     pub fn of(constraint: &(impl ContactConstraint<T> + ?Sized)) -> Self {
         let mut contacts = Self::new();
         constraint.contacts(&mut contacts);
@@ -224,7 +223,8 @@ impl<T: Real> Contacts<T> {
     }
 }
 
-/// Forwards every method, defaults included: what is boxed or lent behaves as what it is.
+/// Forwards every method, including defaults, so that a boxed or borrowed constraint behaves as the constraint
+/// itself.
 macro_rules! forward {
     ($($kind:tt)+) => {
         impl<T: Real, C: ContactConstraint<T> + ?Sized> ContactConstraint<T> for $($kind)+ {
@@ -274,7 +274,7 @@ macro_rules! forward {
 forward!(Box<C>);
 forward!(&mut C);
 
-/// What a search found, or following.
+/// Whether a search or a follow has changed candidates or rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Candidates {
     /// The same candidates with the same rows of G.
@@ -284,25 +284,25 @@ pub enum Candidates {
 }
 
 impl Candidates {
-    /// [`Changed`](Self::Changed) if so, else [`Unchanged`](Self::Unchanged).
+    /// [`Changed`](Self::Changed) if `changed`, else [`Unchanged`](Self::Unchanged).
     pub fn changed_if(changed: bool) -> Self {
         if changed { Self::Changed } else { Self::Unchanged }
     }
 }
 
-/// Where the rates of the gaps come from.
+/// The source of the rates of the gaps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rates {
-    /// The constraint has given them all.
+    /// The constraint has written them all.
     Given,
-    /// They are all zero, and the slice is left as it is: gaps are G u and a constant, with rows that do not turn. Not
-    /// asked again until rows change.
+    /// They are all zero, and the slice is unchanged: gaps are G u plus a constant, with constant rows. Not called
+    /// again until rows change.
     Zero,
-    /// The caller finds them, by central differences of the gaps in time around (t, u): ∂g/∂t of g(t ± δ, u), and
-    /// Ġ v + ∂ġ/∂t of g(t ± δ, u ± δ v), at which the constraint [follows](ContactConstraint::follow). What the gaps do
-    /// between t ± 1/16 of the time that the search looks ahead enters, also at a start; the errors are fourth and
-    /// higher derivatives of the gap in that time (`docs/contact.md`).
+    /// The caller finds them by central differences of the gaps in time around (t, u): ∂g/∂t of g(t ± δ, u), and
+    /// Ġ v + ∂ġ/∂t of g(t ± δ, u ± δ v), to which the constraint [follows](ContactConstraint::follow). δ is at most 1/16
+    /// of the time that the search looks ahead (1/4 in single precision), also at a start, and gaps within t ± δ
+    /// enter. The errors are fourth and higher derivatives of the gap in that time (`docs/contact.md`).
     Differences,
 }
 
@@ -310,26 +310,26 @@ pub enum Rates {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Variation {
-    /// Never: [`ContactConstraint::search`] is called once, and nothing moves after it.
+    /// Never: [`ContactConstraint::search`] is called once, and rows are constant after it.
     Never,
-    /// By a search, once a step: [`ContactConstraint::follow`] never moves anything, because gaps are affine in u
+    /// By a search, once a step: [`ContactConstraint::follow`] never changes rows, because gaps are affine in u
     /// between two searches.
     BySearch,
-    /// Wherever they follow u.
+    /// Whenever u changes.
     Follows,
 }
 
-/// A step as contact constraints see it before it is accepted: from where to where it has gone.
+/// A step as contact constraints check it before it is accepted.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Stride<'a, T> {
     /// Times of its start and its end.
     pub t: [f64; 2],
-    /// Displacements there, one a dof of the constraint.
+    /// Displacements at its start and its end, one per dof of the constraint.
     pub u: [&'a [T]; 2],
     /// Velocities at its start.
     pub v: &'a [T],
-    /// Which candidates of the constraint were closed at its start, and are at its end.
+    /// Whether each candidate of the constraint was closed at its start and at its end.
     pub closed: [&'a [bool]; 2],
 }
 
@@ -339,7 +339,7 @@ impl<'a, T> Stride<'a, T> {
         Self { t, u, v, closed }
     }
 
-    /// The error of a contact (feature, candidate) of the constraint: `way` is that of its node against the surface.
+    /// The error of a contact (feature, candidate) of the constraint; `way` is its relative displacement in the step.
     pub(crate) fn refuse(&self, (feature, candidate): (usize, usize), what: &'static str, way: f64, gap: f64) -> Error {
         let contact = ContactId { constraint: 0, feature, candidate };
         Error::PassedThrough { t: self.t[0], h: self.t[1] - self.t[0], contact, what, way, gap }

@@ -1,14 +1,15 @@
-//! What a constraint says of its candidates: names, laws, rows, and what is drawn of them.
+//! The candidates of a constraint: their names, laws, rows, and output data.
 
 use super::{ContactJacobian, ContactLaw};
 use crate::real::Real;
 use std::ops::Range;
 
-/// What a constraint says of its candidates, in their order: filled by
-/// [`ContactConstraint::contacts`](super::ContactConstraint::contacts), one [`push`](Self::push) a candidate.
+/// The candidates of a constraint, in their order.
+/// [`ContactConstraint::contacts`](super::ContactConstraint::contacts) fills it with one [`push`](Self::push) per
+/// candidate.
 ///
-/// Rows name dofs by their *place* in [`ContactConstraint::dofs`](super::ContactConstraint::dofs), not by their number
-/// in the system.
+/// Rows refer to dofs by their *place* in [`ContactConstraint::dofs`](super::ContactConstraint::dofs), not by their
+/// index in the system.
 ///
 /// ```
 /// use contact_dynamics::ContactLaw;
@@ -30,7 +31,7 @@ pub struct Contacts<T> {
     magnitudes: Vec<T>,
     recoveries: Vec<T>,
     tangents: ContactJacobian<T>,
-    /// Where the tangents of each contact begin.
+    /// The first tangent of each contact.
     first_tangents: Vec<usize>,
     frictions: Vec<f64>,
     positions: Vec<Option<[T; 3]>>,
@@ -55,12 +56,12 @@ impl<T> Default for Contacts<T> {
 }
 
 impl<T: Real> Contacts<T> {
-    /// None yet.
+    /// An empty list.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Forgets all, and keeps the memory.
+    /// Removes all candidates and keeps the memory.
     pub fn clear(&mut self) {
         let Self { names, laws, rows, magnitudes, recoveries, tangents, .. } = self;
         names.clear();
@@ -83,7 +84,7 @@ impl<T: Real> Contacts<T> {
         self.finish(name, law)
     }
 
-    /// The same with a row of a matrix.
+    /// As [`push`](Self::push), with a row of a matrix.
     pub(crate) fn push_row(
         &mut self,
         name: (usize, usize),
@@ -131,22 +132,22 @@ impl<T: Real> Contacts<T> {
         self.rows.row(contact)
     }
 
-    /// All rows of G; the dofs that they name are places.
+    /// All rows of G; their dofs are places.
     pub(crate) fn rows(&self) -> &ContactJacobian<T> {
         &self.rows
     }
 
-    /// Whether names and rows are those of another list.
+    /// Whether names and rows equal those of another list.
     pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
         self.names == other.names && self.rows == other.rows
     }
 
-    /// What [`Contact::magnitude`] was given; zero if nothing.
+    /// The value set with [`Contact::magnitude`]; zero by default.
     pub fn magnitude(&self, contact: usize) -> T {
         self.magnitudes[contact]
     }
 
-    /// What [`Contact::recovery`] was given; infinity if nothing.
+    /// The value set with [`Contact::recovery`]; infinity by default.
     pub fn recovery(&self, contact: usize) -> T {
         self.recoveries[contact]
     }
@@ -156,17 +157,17 @@ impl<T: Real> Contacts<T> {
         self.tangents_of(contact).map(|row| self.tangents.row(row).collect()).collect()
     }
 
-    /// The friction coefficient of a candidate; zero if none was given.
+    /// The friction coefficient of a candidate; zero by default.
     pub fn friction(&self, contact: usize) -> f64 {
         self.frictions[contact]
     }
 
-    /// The tangents of all candidates, one after the other; the dofs that they name are places.
+    /// The tangents of all candidates, one after the other; their dofs are places.
     pub(crate) fn tangent_rows(&self) -> &ContactJacobian<T> {
         &self.tangents
     }
 
-    /// Those of a candidate among them.
+    /// The range of a candidate's tangents in [`tangent_rows`](Self::tangent_rows).
     pub(crate) fn tangents_of(&self, contact: usize) -> Range<usize> {
         let end = self.first_tangents.get(contact + 1).copied().unwrap_or(self.tangents.rows());
         self.first_tangents[contact]..end
@@ -177,57 +178,57 @@ impl<T: Real> Contacts<T> {
         self.frictions.iter().any(|&friction| friction != 0.0)
     }
 
-    /// The number of rows that candidates have for their friction.
+    /// The number of tangents of candidates with friction.
     pub(crate) fn rubbing_rows(&self) -> usize {
         let rubs = |contact: &usize| self.frictions[*contact] != 0.0;
         (0..self.len()).filter(rubs).map(|contact| self.tangents_of(contact).len()).sum()
     }
 
-    /// Where a contact is, if its constraint has said so.
+    /// The position of a contact, if its constraint has set it.
     pub fn position(&self, contact: usize) -> Option<[T; 3]> {
         self.positions[contact]
     }
 
-    /// The normal of a contact in space, if its constraint has said so.
+    /// The normal of a contact in space, if its constraint has set it.
     pub fn normal(&self, contact: usize) -> Option<[T; 3]> {
         self.normals[contact]
     }
 }
 
-/// [`ContactLaw::kept_depth`] of what comes out slowly.
+/// The part of the penetration that exceeds the recovery of a step, see [`ContactLaw::kept_depth`].
 pub(crate) fn kept_depth<T: Real>(gap: T, recovery: T) -> T {
     (-gap - recovery).max(T::zero())
 }
 
-/// A candidate that was pushed last: what else there is to say of it.
+/// The candidate pushed last, for its optional data.
 #[derive(Debug)]
 pub struct Contact<'c, T> {
     contacts: &'c mut Contacts<T>,
 }
 
 impl<T: Real> Contact<'_, T> {
-    /// A row beside the normal one, along which bodies slide: (place, weight) pairs, so that its product with the
-    /// velocities is the slip. One in the plane, along (n_y, −n_x) by all constraints of this crate, n the direction in
-    /// which the gap opens; two in space, along directions that are orthonormal, for the cone of
-    /// friction is round. Without [`friction`](Self::friction) it is kept for output.
+    /// Adds a tangential row: (place, weight) pairs whose product with the velocities is the slip. There is one in
+    /// the plane, which all constraints of this crate take along (n_y, −n_x), with n the direction in which the gap
+    /// opens. There are two in space, along orthonormal directions, because the friction cone is round. Without
+    /// [`friction`](Self::friction) they are kept for output.
     pub fn tangent(&mut self, row: &[(usize, T)]) -> &mut Self {
         self.contacts.tangents.push(row);
         self
     }
 
-    /// The same with a row of a matrix.
+    /// As [`tangent`](Self::tangent), with a row of a matrix.
     pub(crate) fn tangent_row(&mut self, (rows, row): (&ContactJacobian<T>, usize)) {
         self.contacts.tangents.push_row(rows, row);
     }
 
-    /// The same with the pairs one by one.
+    /// As [`tangent`](Self::tangent), with an iterator of pairs.
     #[cfg(feature = "search")]
     pub(crate) fn tangent_entries(&mut self, entries: impl Iterator<Item = (usize, T)>) {
         self.contacts.tangents.push_entries(entries);
     }
 
-    /// Coulomb's friction along the [tangents](Self::tangent): the coefficient μ, from 0, the default. |f| ≤ μ p, and f
-    /// opposes the slip. It may be another one after each search: a function of the place, for instance.
+    /// Sets Coulomb's friction along the [tangents](Self::tangent): the coefficient μ ≥ 0, zero by default. |f| ≤ μ p,
+    /// and f opposes the slip. It may change with each search, for instance as a function of the position.
     pub fn friction(&mut self, coefficient: f64) -> &mut Self {
         if let Some(friction) = self.contacts.frictions.last_mut() {
             *friction = coefficient;
@@ -235,8 +236,8 @@ impl<T: Real> Contact<'_, T> {
         self
     }
 
-    /// The size of what is summed to the gap besides G u and the gap itself, for instance coordinates (length): contact
-    /// takes gaps for zero within the rounding of it. Nothing if not given.
+    /// Sets the magnitude (length) of the terms of the gap besides G u and the gap itself, for instance coordinates.
+    /// Contact treats gaps within the rounding of it as zero. The default is zero.
     pub fn magnitude(&mut self, size: T) -> &mut Self {
         if let Some(magnitude) = self.contacts.magnitudes.last_mut() {
             *magnitude = size;
@@ -244,14 +245,14 @@ impl<T: Real> Contact<'_, T> {
         self
     }
 
-    /// How far (length, d ≥ 0) a step lets this contact come out of the other body. Where the search at the start of a
-    /// step finds a gap g below −d, the contact has to be at g + d at its end, and no farther. A corner that has come
-    /// in beside an edge, where nothing looked for it, is otherwise thrown out in one step, and gains energy from
-    /// nothing. Steps that are halved, or end early to land on a time, let it come out by as much less. It is read of
-    /// [`ContactLaw::Rigid`] only. If not given all comes out at once.
+    /// Limits the penetration (length, d ≥ 0) recovered per step. If the search at the start of a step finds a gap g
+    /// below −d, the gap at its end must be g + d. Without a limit, a corner that has penetrated beside an edge,
+    /// where no row was, would be thrown out in one step and gain energy. Steps that are halved, or shortened to end
+    /// at a given time, recover less in proportion. It applies to [`ContactLaw::Rigid`] only. By default all is
+    /// recovered at once.
     ///
-    /// Closed contacts of a state may so have negative gaps. Those at the start of a run are another matter
-    /// ([`InitialOverclosure`](crate::InitialOverclosure)).
+    /// So closed contacts of a state may have negative gaps. For negative gaps at the start of a run see
+    /// [`InitialOverclosure`](crate::InitialOverclosure).
     ///
     /// ```
     /// use contact_dynamics::ContactLaw;
@@ -269,7 +270,7 @@ impl<T: Real> Contact<'_, T> {
         self
     }
 
-    /// Where the contact is, for output: x, y, z (length; zero where there is no such axis).
+    /// Sets the position of the contact, for output: x, y, z (length; zero for a missing axis).
     pub fn position(&mut self, position: [T; 3]) -> &mut Self {
         if let Some(last) = self.contacts.positions.last_mut() {
             *last = Some(position);
@@ -277,7 +278,7 @@ impl<T: Real> Contact<'_, T> {
         self
     }
 
-    /// The direction in space in which the gap opens, for output: a unit vector.
+    /// Sets the direction in space in which the gap opens, for output: a unit vector.
     pub fn normal(&mut self, normal: [T; 3]) -> &mut Self {
         if let Some(last) = self.contacts.normals.last_mut() {
             *last = Some(normal);

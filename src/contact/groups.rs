@@ -1,19 +1,20 @@
-//! Rows that share dofs, directly or through others: where forces move only the dofs they act on, one group knows
-//! nothing of another, and each is solved for by itself.
+//! Groups of rows that share dofs, directly or through other rows. If forces move only the dofs on which they act,
+//! groups are independent and are solved one by one.
 
 use std::ops::Range;
 
-/// Some rows of G sorted into groups.
+/// Rows of G sorted into groups.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Groups {
-    /// Positions in the list of rows, group after group; within a group, and of groups the first ones, ascending.
+    /// Positions in the list of rows, group after group. They ascend within a group; so do the first positions of the
+    /// groups.
     positions: Vec<usize>,
     starts: Vec<usize>,
-    /// For each position one of its group, itself if it is the group's first.
+    /// For each position an earlier one of its group, or itself if it is the first of the group.
     leader: Vec<usize>,
-    /// For each dof a position that acts on it; `FREE` outside of a sorting.
+    /// For each dof a position that acts on it; `FREE` outside of `sort`.
     owner: Vec<usize>,
-    /// For each position its group, and for each group where its next position goes, while they are laid out.
+    /// Work space of `sort`: the group of each position, and the next free entry of each group.
     place: Vec<usize>,
     next: Vec<usize>,
 }
@@ -22,7 +23,7 @@ pub(crate) struct Groups {
 const FREE: usize = usize::MAX;
 
 impl Groups {
-    /// Memory for so many rows that act on dofs below `dofs`.
+    /// Reserves memory for `rows` rows that act on dofs below `dofs`.
     pub(crate) fn with_capacity(rows: usize, dofs: usize) -> Self {
         let reserved = |n| Vec::with_capacity(n);
         Self {
@@ -35,8 +36,8 @@ impl Groups {
         }
     }
 
-    /// Sorts rows by the dofs (below `dofs`) that each of them acts on. Rows that are tied to the one before them in
-    /// the list are in its group whatever they act on.
+    /// Groups rows by the dofs (below `dofs`) on which they act. A row that is tied to the one before it in the list
+    /// is in the group of that row, whatever its dofs.
     pub(crate) fn sort<D: Iterator<Item = usize>>(
         &mut self,
         rows: &[usize],
@@ -112,7 +113,7 @@ impl Groups {
         &self.positions
     }
 
-    /// Where a group is in [`positions`](Self::positions).
+    /// The range of a group in [`positions`](Self::positions).
     pub(crate) fn range(&self, group: usize) -> Range<usize> {
         self.starts[group]..self.starts[group + 1]
     }
@@ -132,7 +133,7 @@ fn find(leader: &mut [usize], mut position: usize) -> usize {
     position
 }
 
-/// Makes one group of two; the earlier first position leads.
+/// Merges two groups; the earlier first position leads.
 fn join(leader: &mut [usize], one: usize, other: usize) {
     let (one, other) = (find(leader, one), find(leader, other));
     leader[one.max(other)] = one.min(other);

@@ -1,4 +1,4 @@
-//! Contact laws: how force and gap of one row belong together.
+//! Contact laws: the relation between force and gap of one row.
 
 use super::contacts::kept_depth;
 use crate::error::{Error, Result, positive};
@@ -7,12 +7,12 @@ use crate::real::Real;
 /// The law of one contact row: its force λ ≥ 0 (compression) given its gap g.
 ///
 /// Rigid laws determine λ by a condition on the gap, or on its rate where the scheme imposes contact on velocities
-/// ([`ContactLevel`](crate::tableau::ContactLevel)). Compliant laws are springs: they act where the scheme takes all
-/// other forces, so a smooth contact keeps the order of the scheme; correctors leave them alone, and schemes without
-/// multiplier contact take them too. In the contact problem a compliance is an addition to the diagonal of the Delassus
-/// operator, solved with the rigid rows.
+/// ([`ContactLevel`](crate::tableau::ContactLevel)). Compliant laws are springs. They act at the instant at which the
+/// scheme evaluates all other forces, so that a smooth contact keeps the order of the scheme. Correctors leave them
+/// unchanged, and schemes without multiplier contact accept them. In the contact problem a compliance is added to the
+/// diagonal of the Delassus operator, and solved together with the rigid rows.
 ///
-/// Numbers are `f64` in every run, in the units of the host: force/length for a stiffness.
+/// Parameters are `f64` in every run, in the units of the host: force/length for a stiffness.
 ///
 /// ```
 /// use contact_dynamics::contact::ContactLaw;
@@ -23,16 +23,16 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ContactLaw {
-    /// Unilateral and rigid: g ≥ 0, λ ≥ 0, λ g = 0. Impacts lose the approach velocity of the contact node.
+    /// Unilateral and rigid: g ≥ 0, λ ≥ 0, λ g = 0. Impacts remove the approach velocity of the contact node.
     Rigid,
-    /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multiplier).
+    /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multipliers).
     Equality,
-    /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0, with ġ the rate at the start of the stage by schemes
-    /// that impose contact on velocities. Where it is imposed on the displacements of the state,
-    /// [`PersistencyCorrection`](crate::PersistencyCorrection) lets a contact that closes leave with e times the rate
-    /// at which it has met the gap zero. With several contacts at once it is the law of simultaneous impact, which for
-    /// Newton's cradle is not the outcome of a sequence of pairwise impacts. Schemes that impose contact ahead of the
-    /// state do not take it.
+    /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0, with ġ the rate at the start of the stage, for
+    /// schemes that impose contact on velocities. If contact is imposed on the displacements of the state, a contact
+    /// that closes leaves with e times the rate at which its gap reached zero, by the
+    /// [`PersistencyCorrection`](crate::PersistencyCorrection). With several contacts at once it is the law of
+    /// simultaneous impact. For Newton's cradle it does not give the outcome of pairwise impacts in sequence. Schemes
+    /// that impose contact ahead of the state do not accept it.
     ///
     /// ```
     /// use contact_dynamics::contact::ContactLaw;
@@ -52,19 +52,20 @@ pub enum ContactLaw {
         /// e, from 0 (plastic, the same as `Rigid`) to 1 (elastic).
         coefficient: f64,
     },
-    /// The rate condition of Laursen and Chawla (Int. J. Numer. Meth. Eng. 40, 1997): a row that is closed at the start
-    /// of the stage, gₙ ≤ 0, has 0 ≤ (g′ − gₙ)/h ⊥ λ ≥ 0; an open one takes no part. For schemes that impose contact on
-    /// the displacements of the state.
+    /// The rate condition of Laursen and Chawla (Int. J. Numer. Meth. Eng. 40, 1997): a row that is closed at the
+    /// start of the stage, gₙ ≤ 0, has 0 ≤ (g′ − gₙ)/h ⊥ λ ≥ 0; an open one has no force. For schemes that impose
+    /// contact on the displacements of the state.
     ///
     /// * λ (g′ − gₙ) = 0. With the balance in the middle of the step, and the mean of v as the change of u (the
-    ///   midpoint rule, [`Gssss::new(1, 1, 1)`](crate::Gssss), and [`EnergyMomentum`](crate::EnergyMomentum)), contact
-    ///   with fixed rows does no work, and energy is conserved. Linear momentum is, with every scheme.
-    /// * Known failures: bodies penetrate by up to one step's approach, and stay there while they are pressed (so a run
-    ///   may start inside). Contact nodes rebound elastically, and contact chatters. With the balance elsewhere contact
-    ///   does work: a mass leaves three times as fast as it came by the trapezoidal rule. Rows of curved surfaces that
-    ///   are not followed drift by (h v)²/(2R) a step.
-    /// * [`Works::contact`](crate::Works::contact) takes the mean of the forces of two steps and shows work that
-    ///   is none; its remainder takes that back.
+    ///   midpoint rule, [`Gssss::new(1, 1, 1)`](crate::Gssss), and [`EnergyMomentum`](crate::EnergyMomentum)),
+    ///   contact with fixed rows does no work, and energy is conserved. Linear momentum is conserved with every
+    ///   scheme.
+    /// * Known failures: bodies penetrate by up to one step's approach, and stay there while they are pressed (so a
+    ///   run may start with penetration). Contact nodes rebound elastically, and contact chatters. With the balance
+    ///   elsewhere contact does work: with the trapezoidal rule a mass leaves three times as fast as it came. Rows of
+    ///   curved surfaces that are not followed drift by (h v)²/(2R) per step.
+    /// * [`Works::contact`](crate::Works::contact) uses the mean of the forces of two steps and reports spurious
+    ///   work; its remainder cancels it.
     ///
     /// ```
     /// use contact_dynamics::contact::ContactLaw;
@@ -94,12 +95,12 @@ pub enum ContactLaw {
     /// * From the second step on the rate of a pressed contact is zero: it persists. With the midpoint rule,
     ///   [`Gssss::new(1, 1, 1)`](crate::Gssss), and a fine mesh the force is smooth without a corrector (figures in
     ///   `docs/contact.md`). Linear momentum is conserved.
-    /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open behind
-    ///   it. The second one leaves a gap that is not mended while contact lasts, up to half a step's approach where the
-    ///   change of u is the mean of v (so a run may start inside). Accelerations are free to alternate: by the
+    /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open after
+    ///   it. The second step leaves a gap that stays while contact lasts. Where the change of u is the mean of v, it
+    ///   is up to half a step's approach (so a run may start with penetration). Accelerations can alternate: with the
     ///   trapezoidal rule forces do, and energy may rise. Rows of curved surfaces that are not followed drift as
-    ///   under `RateCondition`. With [`LaursenLove`](crate::corrector::LaursenLove), by which contacts rebound, it is
-    ///   refused.
+    ///   under `RateCondition`. [`LaursenLove`](crate::corrector::LaursenLove), with which contacts rebound, is
+    ///   rejected.
     PersistencySwitch,
     /// λ = k ⟨−g⟩: a linear spring in compression.
     Penalty {
@@ -113,16 +114,16 @@ pub enum ContactLaw {
         /// p ≥ 1.
         exponent: f64,
     },
-    /// A spring and a dashpot side by side (Kelvin and Voigt): with δ = −g > 0, λ = ⟨k δ + c δ̇⟩. The force never
-    /// pulls: a contact ends where k δ + c δ̇ = 0, while the gap is negative still. Gap and rate are those of the
-    /// instant at which the scheme balances all forces, so that in lasting compression the dashpot is one of C.
+    /// A spring and a dashpot in parallel (Kelvin and Voigt): with δ = −g > 0, λ = ⟨k δ + c δ̇⟩. The force never
+    /// pulls: a contact ends at k δ + c δ̇ = 0, while the gap is still negative. Gap and rate are taken at the
+    /// instant of the scheme's balance, so that in lasting compression the dashpot acts as a part of C.
     ///
-    /// * The force jumps to c δ̇ where bodies touch at speed, somewhere within a step: errors are of first order.
+    /// * The force jumps to c δ̇ where bodies touch at speed, at some time within a step: errors are of first order.
     ///   [`HuntCrossley`](Self::HuntCrossley) has no jump.
-    /// * An impact of a mass m at the speed v leaves with e v, whatever v; with ξ = c/(2 √(k m)) < 1 it is
-    ///   e = exp(−ξ φ/√(1 − ξ²)), cos φ = 2 ξ² − 1.
-    /// * Of the work of contact forces [`Works::contact`](crate::Works::contact) has that of the spring, −½ k δ²;
-    ///   [`Works::damping`](crate::Works::damping) has the rest.
+    /// * A mass m that impacts at the speed v leaves with e v, for any v; with ξ = c/(2 √(k m)) < 1, e = exp(−ξ φ/√(1
+    ///   − ξ²)), cos φ = 2 ξ² − 1.
+    /// * [`Works::contact`](crate::Works::contact) has the work of the spring, −½ k δ²;
+    ///   [`Works::damping`](crate::Works::damping) has the rest of the work of contact forces.
     ///
     /// ```
     /// use contact_dynamics::contact::ContactLaw;
@@ -147,10 +148,10 @@ pub enum ContactLaw {
         /// c (force·time/length), not negative.
         damping: f64,
     },
-    /// A spring that dissipates as it is pressed (Hunt and Crossley, J. Appl. Mech. 42, 1975): with δ = −g > 0,
-    /// λ = k δ^p ⟨1 + χ δ̇⟩. The force begins and ends at zero, so errors are those of a spring. An impact at the speed
-    /// v leaves with the speed w of v − ln(1 + χ v)/χ = −w − ln(1 − χ w)/χ, whatever mass, k and p: e = w/v is
-    /// 1 − ⅔ χ v + … for small χ v. Works are booked as under [`KelvinVoigt`](Self::KelvinVoigt).
+    /// A spring with a dissipation that grows with its compression (Hunt and Crossley, J. Appl. Mech. 42, 1975): with
+    /// δ = −g > 0, λ = k δ^p ⟨1 + χ δ̇⟩. The force begins and ends at zero, so that errors are those of a spring. An
+    /// impact at the speed v leaves with the speed w given by v − ln(1 + χ v)/χ = −w − ln(1 − χ w)/χ, for any mass, k
+    /// and p: e = w/v is 1 − ⅔ χ v + … for small χ v. Works are booked as for [`KelvinVoigt`](Self::KelvinVoigt).
     ///
     /// ```
     /// use contact_dynamics::contact::ContactLaw;
@@ -166,61 +167,62 @@ pub enum ContactLaw {
         dissipation: f64,
     },
     /// λ = ⟨−k g − m g̈⟩: a spring and a mass that contact couples in (Asano 1986; Hetherington, Rodríguez-Ferran,
-    /// Askes 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical step.
-    /// Switching the mass on at speed changes the kinetic energy, and over many impacts energy grows;
-    /// [`StabilizedBipenalty`](Self::StabilizedBipenalty) mends that.
+    /// Askes 2012). With m ≥ k (h_c/2)², h_c the critical step of the mesh, explicit schemes keep their critical
+    /// step. Switching the mass on at speed changes the kinetic energy, and over many impacts energy grows;
+    /// [`StabilizedBipenalty`](Self::StabilizedBipenalty) avoids that.
     Bipenalty {
         /// k (force/length).
         stiffness: f64,
         /// m (mass).
         mass: f64,
     },
-    /// The bipenalty with m = k h²/4 in a stabilized form, for [`CentralDifference`](crate::CentralDifference): the
-    /// free motion predicts the gap of the next step, and with ḡ₋ and ḡ₊ the means of the gap over the last and the
+    /// The bipenalty with m = k h²/4 in a stabilized form, for [`CentralDifference`](crate::CentralDifference). The
+    /// free motion predicts the gap of the next step. With ḡ₋ and ḡ₊ the means of the gap over the last and the
     /// coming step
     ///
     /// ```text
     /// λ = ½ k ⟨−ḡ₊ + ⟨−ḡ₋⟩⟩,      ḡ₊ = ĝ₊ + ½ h² G M⁻¹ Gᵀ λ
     /// ```
     ///
-    /// with ĝ₊ predicted. While contact lasts it is the plain form, k g + m g̈. That one counts ḡ₋ where it is open
-    /// too, which is the work that its impacts create; here the mass acts on what contact itself does. The critical
-    /// step is that of the mesh, whatever k; without loads, for linear gaps and an obstacle at rest, the energy
+    /// with the predicted ĝ₊. While contact lasts it equals the plain form, k g + m g̈. The plain form also counts ḡ₋
+    /// of open gaps, and its impacts create energy by the work of that term; here the mass acts only during contact.
+    /// The critical step is that of the mesh, for any k. Without loads, for linear gaps and an obstacle at rest, the
+    /// energy
     ///
     /// ```text
     /// ½ v̂ᵀ M v̂ + ½ uₙᵀ K uₙ₊₁ + ½ k ⟨−ḡ⟩²,      v̂ = (uₙ₊₁ − uₙ)/h,      ḡ = ½ (gₙ + gₙ₊₁)
     /// ```
     ///
-    /// never rises, and stays the same while contact lasts (`docs/theory.md`, section 5.2). A predictor and a corrector
-    /// are the idea of Kolman, Kopačka, González, Cho, Park (Math. Comput. Simul. 189, 2021); their formulas were not
-    /// available to us, this form and its proof are ours.
+    /// never rises, and is constant while contact lasts (`docs/theory.md`, section 5.2). The idea of a predictor and
+    /// a corrector is from Kolman, Kopačka, González, Cho, Park (Math. Comput. Simul. 189, 2021). Their formulas were
+    /// not available to us; this form and its proof are ours.
     ///
     /// Known failures: penetration, as with a penalty; a very stiff spring rings.
     StabilizedBipenalty {
         /// k (force/length).
         stiffness: f64,
     },
-    /// Augmented Lagrangian (Alart and Curnier 1991; Simo and Laursen 1992): λ = ⟨λ̂ − k g⟩ with λ̂ = 0 at first, as a
-    /// penalty, then replaced by λ so many times within the stage. Every augmentation takes the solution closer to that
-    /// of rigid contact, the faster the stiffer the spring. λ̂ is not carried to the next step: in dynamics that
-    /// integrates the gap over time and grows. Where the gap does not depend on the force (explicit schemes) it is a
-    /// penalty.
+    /// Augmented Lagrangian (Alart and Curnier 1991; Simo and Laursen 1992): λ = ⟨λ̂ − k g⟩ with λ̂ = 0 at first, as
+    /// a penalty. Then λ̂ is replaced by λ, `augmentations` times within the stage. Every augmentation brings the
+    /// solution closer to rigid contact, and more so with a stiffer spring. λ̂ is not carried to the next step: in
+    /// dynamics that would integrate the gap over time and grow. If the gap does not depend on the force (explicit
+    /// schemes), it is a penalty.
     AugmentedLagrangian {
         /// k (force/length).
         stiffness: f64,
-        /// How often λ̂ is replaced within a stage; at most 10 000.
+        /// The number of replacements of λ̂ within a stage; at most 10 000.
         augmentations: usize,
     },
 }
 
-/// What a row constrains in a stage.
+/// The quantity that a row constrains in a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measure {
-    /// What the scheme asks for: the gap, or h times its rate.
+    /// The quantity that the scheme constrains: the gap, or h times its rate.
     AsScheme,
     /// The change of the gap since the start of the stage.
     Increment,
-    /// h times the rate of the gap, by a scheme that asks for the gap.
+    /// h times the rate of the gap, in a scheme that constrains the gap.
     Rate,
     /// Nothing: the row is open in this stage.
     Nothing,
@@ -228,8 +230,8 @@ pub(crate) enum Measure {
     Undecided,
 }
 
-/// How the depth δ of a row and its rate δ̇ depend on y, what the row constrains in a stage: [value at y = 0, slope by
-/// −y] of each. y is the gap, or h times its rate where the unknown moves the rate alone.
+/// The depth δ of a row and its rate δ̇ as functions of y, the quantity that the row constrains in a stage: [value at
+/// y = 0, slope with respect to −y] of each. y is the gap, or h times its rate if the unknown changes only the rate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Course<T> {
     pub(crate) depth: [T; 2],
@@ -237,7 +239,7 @@ pub(crate) struct Course<T> {
 }
 
 impl<T: Real> Course<T> {
-    /// y is the gap, at a rate of zero.
+    /// y is the gap, and the rate is zero.
     pub(crate) fn at_rest() -> Self {
         Self { depth: [T::zero(), T::one()], approach: [T::zero(); 2] }
     }
@@ -252,7 +254,7 @@ impl<T: Real> Course<T> {
         [self.depth, self.approach].map(|[start, slope]| start + slope * x)
     }
 
-    /// The tangent of a damped law there, as 0 ≤ y + c λ + s.
+    /// The tangent of a damped law at −y = x, in the form 0 ≤ y + c λ + s.
     fn tangent(&self, law: &ContactLaw, x: T, [by_depth, by_rate]: [T; 2]) -> (T, T) {
         let [depth, approach] = self.at(x);
         let slope = (by_depth * self.depth[1] + by_rate * self.approach[1]).max(T::min_positive_value());
@@ -266,7 +268,7 @@ impl ContactLaw {
         Self::PowerLaw { stiffness: 4.0 / 3.0 * modulus * radius.sqrt(), exponent: 1.5 }
     }
 
-    /// Whether the force follows from the gap (and its derivatives): the gap may be negative.
+    /// Whether the force is a function of the gap (and its derivatives): the gap may be negative.
     pub fn is_compliant(&self) -> bool {
         match self {
             Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
@@ -290,7 +292,7 @@ impl ContactLaw {
         }
     }
 
-    /// e of Newton's impact law, the share of the approach with which a contact leaves, for rows under that law.
+    /// e of Newton's impact law, the ratio of the rates after and before an impact; none for other laws.
     pub(crate) fn restitution(&self) -> Option<f64> {
         match *self {
             Self::Restitution { coefficient } => Some(coefficient),
@@ -298,12 +300,12 @@ impl ContactLaw {
         }
     }
 
-    /// Whether a contact leaves with a share of its approach.
+    /// Whether a contact rebounds with a share of its approach rate.
     pub(crate) fn rebounds(&self) -> bool {
         self.restitution().is_some_and(|coefficient| coefficient > 0.0)
     }
 
-    /// What a row constrains, which was closed at the start of the stage or open.
+    /// The quantity that a row constrains, by whether it was closed at the start of the stage.
     pub(crate) fn measure(&self, closed: bool) -> Measure {
         match (self, closed) {
             (Self::RateCondition, true) => Measure::Increment,
@@ -313,23 +315,23 @@ impl ContactLaw {
         }
     }
 
-    /// Whether the row demands of the scheme that its unknown moves what contact constrains: a multiplier holds it.
-    /// (Forces of the others follow from the gaps.)
+    /// Whether a multiplier enforces the row, so that the scheme's unknown must change the constrained quantity.
+    /// Forces of the other laws are functions of the gaps.
     pub(crate) fn needs_multiplier(&self) -> bool {
         !self.is_compliant() || self.is_predictive()
     }
 
-    /// Whether the force follows from the gap of the state and its rate, without masses and predictions.
+    /// Whether the force is a function of the gap of the state and its rate, without masses and predictions.
     pub(crate) fn is_spring(&self) -> bool {
         self.is_compliant() && self.inertia() == 0.0 && !self.is_predictive()
     }
 
-    /// Whether the rates of the gap matter: to the condition, or to corrections.
+    /// Whether the condition, or corrections, use the rates of the gap.
     pub(crate) fn reads_rates(&self) -> bool {
         !self.is_compliant() || self.inertia() > 0.0 || self.is_damped()
     }
 
-    /// Whether the force is no piecewise linear function of the gap: it is then linearized until it is met.
+    /// Whether the force is not piecewise linear in the gap; then it is linearized repeatedly until it converges.
     pub(crate) fn is_nonlinear(&self) -> bool {
         matches!(self, Self::PowerLaw { .. } | Self::KelvinVoigt { .. } | Self::HuntCrossley { .. })
     }
@@ -339,19 +341,19 @@ impl ContactLaw {
         self.is_compliant() || self.reads_start()
     }
 
-    /// Whether a closed row leaves jumps of velocity and acceleration that correctors remove.
+    /// Whether a closed row causes jumps of velocity and acceleration that correctors remove.
     pub(crate) fn leaves_jumps(&self) -> bool {
         !self.is_compliant()
     }
 
-    /// Whether the row constrains the gap, or its rate where the scheme does, and nothing else. (Predictions of
-    /// displacements are projected on such rows.)
+    /// Whether the row constrains only the gap, or its rate where the scheme does. Predicted displacements are
+    /// projected onto such rows.
     pub(crate) fn is_plain(&self) -> bool {
         matches!(self, Self::Rigid | Self::Equality)
     }
 
-    /// Whether the contact may have friction, bounded by μ times the force of the law: not where that may pull, nor
-    /// where it is no force of the instant alone.
+    /// Whether the contact may have friction, bounded by μ times the force of the law. Not for laws whose force may
+    /// pull, or does not belong to a single instant.
     pub(crate) fn admits_friction(&self) -> bool {
         match self {
             Self::Rigid
@@ -369,17 +371,19 @@ impl ContactLaw {
         }
     }
 
-    /// Whether a compliant law reads the gap that the scheme constrains, ahead of the state, beside those of the step.
+    /// Whether a compliant law reads the gap that the scheme constrains ahead of the state, in addition to those of
+    /// the step.
     pub(crate) fn is_predictive(&self) -> bool {
         matches!(self, Self::StabilizedBipenalty { .. })
     }
 
-    /// Whether what is found deep inside would come out at once, and is to come out slowly instead.
+    /// Whether the law would recover a penetration at once, so that its recovery is limited per step.
     pub(crate) fn keeps_depths(&self) -> bool {
         *self == Self::Rigid
     }
 
-    /// By how much a step measures a gap from below zero, if a contact comes out by no more than its `recovery` in it.
+    /// The part of a penetration that stays in this step, if at most `recovery` of it is recovered. Gaps are measured
+    /// from it.
     pub(crate) fn kept_depth<T: Real>(&self, gap: T, recovery: T) -> T {
         if self.keeps_depths() { kept_depth(gap, recovery) } else { T::zero() }
     }
@@ -395,7 +399,7 @@ impl ContactLaw {
         matches!(self, Self::RateCondition | Self::PersistencySwitch)
     }
 
-    /// Refuses parameters out of range.
+    /// Rejects parameters out of range.
     pub(crate) fn check(&self) -> Result<()> {
         let inside = |name, value: f64, ok: bool, range| match ok {
             true => Ok(()),
@@ -441,7 +445,7 @@ impl ContactLaw {
         }
     }
 
-    /// Refuses parameters that the scalar of a run turns into zero or infinity, or their reciprocals.
+    /// Rejects parameters that become zero or infinite in the scalar of a run, or whose reciprocals do.
     pub(crate) fn check_scalar<T: Real>(&self) -> Result<()> {
         let fits = |name, value: f64| {
             let own = T::of(value);
@@ -484,7 +488,7 @@ impl ContactLaw {
         }
     }
 
-    /// Weight of g̈ beside g in the condition of a row (time²): m/k of a bipenalty.
+    /// Weight of g̈ relative to g in the condition of a row (time²): m/k of a bipenalty.
     pub(crate) fn inertia(&self) -> f64 {
         match self {
             Self::Bipenalty { stiffness, mass } => mass / stiffness,
@@ -492,7 +496,7 @@ impl ContactLaw {
         }
     }
 
-    /// The force of a compliant law for y, the gap with its inertia, and the rate δ̇ of approach: zero if y ≥ 0.
+    /// The force of a compliant law for y, the gap with its inertia, and the rate of approach δ̇: zero if y ≥ 0.
     pub(crate) fn force<T: Real>(&self, y: T, approach: T) -> T {
         let depth = (-y).max(T::zero());
         match *self {
@@ -509,7 +513,7 @@ impl ContactLaw {
         }
     }
 
-    /// The force of a damped law, where it would pull too.
+    /// The force of a damped law, including negative values.
     fn pull<T: Real>(&self, depth: T, approach: T) -> T {
         match *self {
             Self::KelvinVoigt { stiffness, damping } => T::of(stiffness) * depth + T::of(damping) * approach,
@@ -520,7 +524,7 @@ impl ContactLaw {
         }
     }
 
-    /// The slopes of the force of a spring that presses, by δ and by δ̇.
+    /// The derivatives of the force of a closed spring with respect to δ and δ̇.
     pub(crate) fn slopes(&self, force: f64, depth: f64) -> [f64; 2] {
         match *self {
             Self::Penalty { stiffness }
@@ -544,7 +548,7 @@ impl ContactLaw {
         }
     }
 
-    /// What a damped spring has stored at a gap, and gives to its dashpot at the latest.
+    /// The energy stored in a damped spring at a gap. The dashpot dissipates it in the end.
     pub(crate) fn stored<T: Real>(&self, gap: T) -> T {
         let depth = (-gap).max(T::zero());
         match *self {
@@ -558,8 +562,8 @@ impl ContactLaw {
 
     /// The law linearized at y as 0 ≤ y + c λ + s ⊥ λ ≥ 0; (c, s) = (0, 0) if it is rigid.
     ///
-    /// Springs are linearized at `least` where they are less deep. `force` is the one found before: the multiplier λ̂
-    /// of an augmented Lagrangian. A dashpot that begins to press takes any force up to c δ̇ at the gap zero.
+    /// Springs at smaller depths are linearized at the depth `least`. `force` is the last solution: the multiplier λ̂
+    /// of an augmented Lagrangian. A dashpot that begins to press may bear any force up to c δ̇ at zero gap.
     pub(crate) fn linearized<T: Real>(&self, y: T, least: T, force: T, course: Course<T>) -> (T, T) {
         let depth = (-y).max(least);
         match *self {
@@ -575,7 +579,7 @@ impl ContactLaw {
             }
             Self::PowerLaw { stiffness, exponent } => {
                 let slope = T::of(stiffness * exponent) * depth.powf(T::of(exponent - 1.0));
-                // At a depth that is next to nothing the spring is next to none, but not infinitely soft.
+                // At tiny depths the stiffness is tiny, but must not be zero.
                 (slope.max(T::min_positive_value()).recip(), depth * (T::one() - T::of(exponent).recip()))
             }
             Self::KelvinVoigt { stiffness, damping } => {
@@ -597,7 +601,7 @@ impl ContactLaw {
         }
     }
 
-    /// How many times more the stage must be solved with another linearization, whatever its solution.
+    /// The number of further solutions of the stage with updated linearizations, even if the solution has converged.
     pub(crate) fn augmentations(&self) -> usize {
         match *self {
             Self::AugmentedLagrangian { augmentations, .. } => augmentations,

@@ -14,14 +14,14 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use rows::Rows;
 
-/// One direction of contact: nodes against a surface.
+/// One direction of contact: slave nodes against a surface.
 #[derive(Debug)]
 struct Pass {
     nodes: Vec<usize>,
     lists: NearestFirst,
-    /// For each node a distance that it has from the surface at least, at the last search.
+    /// For each node a lower bound of its distance from the surface, at the last search.
     clearance: Vec<f64>,
-    /// The boxes of the facets at the last search, of which each node looks at many.
+    /// The boxes of the facets at the last search, which many nodes share.
     boxes: Vec<Bounds>,
 }
 
@@ -32,79 +32,78 @@ impl Pass {
     }
 }
 
-/// Contact of two deforming surfaces, of the nodes of each with the facets of the other: segments in two dimensions,
-/// triangles and bilinear quadrilaterals in three. Two passes are made, unless [`one_pass`](Self::one_pass) is asked
-/// for by name.
+/// Contact of two deforming surfaces: the nodes of each with the facets of the other. Facets are segments in two
+/// dimensions, triangles and bilinear quadrilaterals in three. There are two passes, except in a
+/// [`one_pass`](Self::one_pass) contact.
 ///
-/// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface,
-/// `g = n · (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on
-/// those of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum,
-/// and angular momentum at the configuration of the search (but for lever arms of √ε of a facet on its sides, see
-/// below). Nodes at a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
+/// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface, `g = n ·
+/// (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on the dofs of
+/// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and
+/// angular momentum at the configuration of the search (up to lever arms of √ε of a facet on its sides, see below).
+/// Nodes at a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
 ///
 /// # Linearization
 ///
-/// Closest points are found at each [`search`](ContactConstraint::search), that is once a step; in between gaps are
-/// affine, `g = g* + G (u − u*)`. Rows follow the contact of a step
-/// ([`follow`](ContactConstraint::follow)): closest points are found again at each trial state, in the lists of the
-/// search, and at the end of the step gaps are the distances there. G is the derivative of the distance, and
-/// [`rates`](ContactConstraint::rates) have its second derivative along the motion, from nodes that slide on facets
-/// that turn. Geometry is computed in `f64` in every run.
+/// Each [`search`](ContactConstraint::search), once a step, finds the closest points. Between searches gaps are
+/// affine, `g = g* + G (u − u*)`. At each trial state [`follow`](ContactConstraint::follow) projects again, onto the
+/// facets in the lists of the search, so that the gaps at the end of the step are the distances there. G is the
+/// derivative of the distance. [`rates`](ContactConstraint::rates) contain the second derivative of the distance
+/// along the motion, for nodes that slide on facets that turn. Geometry is computed in `f64` in every run.
 ///
-/// What a step brings near is searched, whatever the speed: a node looks as far as its velocity against the other
-/// surface takes it. A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which a node, moving
-/// by more than an eighth of a facet, has gone through one, or was stopped where the surface is not; or, moving by more
-/// than a facet, was stopped along a normal that is not that of the place. Way and facets are taken as straight within
-/// the step.
+/// The search range includes the distance that a node covers in the step by its velocity relative to the other
+/// surface, so that it fits any speed. A step is rejected ([`Error::PassedThrough`], and a smaller step helps) if a
+/// node that moves by more than an eighth of a facet is stopped away from the surface or, without a row, goes through
+/// a facet; or if a node with a row that moves by more than 0.6 of a facet goes through one, or is stopped along
+/// another normal than where it met the surface. Motions and facets count as straight within the step.
 ///
-/// A row lasts for its step. Its facet goes on a quarter of itself beyond an open rim, and may turn 19° nearer to the
-/// node's own normal than [`facing`](Self::facing) lets a search find it, so that a node that slides off a table or
-/// turns away ends its step. One that goes farther, or that leaves the facets the search can know of, is lost: a step
-/// in which it presses is refused ([`Error::ContactLost`], which a smaller step mends); if its gap is above 1 % of the
-/// reach where it was last linearized, it is open, and the row stays as it was. A row whose normal has jumped more than
-/// eight times since the search at one time, between two facets or around an edge that its node touches, stays as it
-/// was too: there is no normal that an iteration could converge to.
+/// A row lasts for its step. Its facet extends a quarter of its size beyond an open rim, and may turn 19° nearer to
+/// the node's own normal than a search with [`facing`](Self::facing) allows, so that a node that slides off a table
+/// or turns away finishes its step. A node that moves farther, or beyond the listed facets, is lost. If its gap, by
+/// its last row, is above 1 % of the reach, it is open and the row stays. Otherwise the step is rejected
+/// ([`Error::ContactLost`], and a smaller step helps). A row also stays if its normal has jumped more than eight
+/// times since the search, at one time of the step, between two facets or around an edge that its node touches: an
+/// iteration would not converge.
 ///
-/// Around a side or a vertex gaps are curved by their own distance; within 1e-3 of the facet rates leave this out, and
-/// are those of the facet.
+/// Around a side or a vertex the curvature of a gap is the reciprocal of its distance. Closer than 1e-3 of the facet,
+/// rates leave this out and are those of the facet.
 ///
 /// # Which facet, which normal
 ///
-/// A node has one row a pass, from the closest facet, and in a dent one for each side of it. Inside of a facet n is the
-/// facet's normal. If the closest point is on a side or a vertex that facets share, n is the direction between it and
-/// the node, so that the gap is continuous when a node passes from one facet to the next; if the node is closer to it
-/// than √ε of the facet's longest side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals. Behind
-/// a convex edge the closest facet changes at the bisector, and with it the normal, not the gap. A node that stands
-/// beyond the rim of an open surface has no row; by 1e-3 of the facet the surface goes on beyond its rim.
+/// A node has one row per pass, from the closest facet, and in a dent one row for each side of it. Inside of a facet
+/// n is the facet's normal. If the closest point is on a shared side or vertex, n is the direction between it and the
+/// node, so that the gap is continuous when a node passes from one facet to the next. If the node is closer to it
+/// than √ε of the facet's longest side (ε of the scalar, 1.5e-8 in `f64`), n is the mean of the facets' normals.
+/// Behind a convex edge the closest facet changes at the bisector, and the normal jumps there, but not the gap. A
+/// node beyond the rim of an open surface has no row; the surface extends beyond its rim by 1e-3 of the facet.
 ///
-/// A node at the bottom of a dent presses on all sides of it. With one row it would come to rest on one side and be
-/// inside of another, and energy would rise when it is let out. So a node that is as near to the bottom as a quarter of
-/// a facet and its way of the step has rows on the other facets around the vertices of the closest one that rise from
-/// there by more than 2.9° (sine 0.05). Within the step rows of a dent stay on their facets, each along its own normal,
-/// as if the facet went on beyond the bottom.
+/// A node at the bottom of a dent presses on all sides of it. With one row it would rest on one side and penetrate
+/// another, and energy would rise at its recovery. So a node whose distance from the bottom is at most a quarter of a
+/// facet plus its displacement in the step has more rows: on the facets that share a vertex with the closest one and
+/// rise from there by more than 2.9° (sine 0.05). Within the step the rows of a dent stay on their facets, extended
+/// as planes, each along its own normal.
 ///
-/// A node that a search finds deeper than 1e-4 of the smallest facet, because an edge has come in beside it for
-/// instance, comes out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
+/// If a search finds a node deeper than 1e-4 of the smallest facet, for instance because an edge has penetrated
+/// beside it, that depth is the penetration recovered per step ([`Contact::recovery`](super::Contact::recovery)).
 ///
-/// On a closed surface the closest point tells inside from outside. A surface that is given in part, or a body
-/// thinner than the depth that may occur, needs the normals of the nodes as well: [`facing`](Self::facing). Where the
-/// surface of the nodes is known, a node is in contact with a facet that it is behind of only up to half of the
-/// material that may lie between, of its body and of the other one, as thick as they are in the reference
-/// configuration: thin bodies do not meet through each other. Give their whole surfaces.
+/// On a closed surface the closest point determines whether a node is inside. A surface that is given in part, or a
+/// body thinner than the possible penetration, needs the normals of the nodes as well: [`facing`](Self::facing). If
+/// the surface of the nodes is known, a node behind a facet is in contact with it only up to half of the material
+/// that may lie between: the thickness of its own body plus that of the other, in the reference configuration. So
+/// there is no contact through thin bodies, if their whole surfaces are given.
 ///
 /// # Identity
 ///
-/// (number of the node, pass), passes being 0 and 1; in a dent the others are (number of the node, pass + 2 (1 +
+/// (index of the node, pass), with pass 0 or 1. The other rows of a dent are (index of the node, pass + 2 (1 +
 /// facet)), with the index of their facet in its list. A node that slides from one facet to the next keeps its
-/// multiplier; [`facet`](Self::facet) tells the facet.
+/// multiplier; [`facet`](Self::facet) returns the facet.
 ///
 /// # Search
 ///
-/// One pass over the nodes compares the bounding boxes of the two surfaces; apart by more than `reach` they have no
-/// candidates. Otherwise each node looks at the facets of its list. Lists hold the facets within `reach` and a
-/// [`skin`](Self::skin); they are built anew, from an R*-tree, when nodes of the two surfaces have moved by more than
-/// the skin relative to each other (in any coordinate). Memory is allocated then and at no other time. Bodies that fly
-/// together rebuild nothing.
+/// The bounding boxes of the two surfaces are compared first; if they are apart by more than `reach`, there are no
+/// candidates. Otherwise each node tries the facets of its list. Lists hold the facets within `reach` and a
+/// [`skin`](Self::skin). They are rebuilt, from an R*-tree, when nodes of the two surfaces have moved by more than
+/// the skin relative to each other (in any coordinate). Memory is allocated only then. Bodies that fly together need
+/// no rebuilds.
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -134,9 +133,9 @@ pub struct NodeToFacet<T: Real> {
     nodes: Nodes,
     /// Positions at the start and at the end of a step, by node.
     ends: [Vec<Point>; 2],
-    /// Facets that the nodes meet.
+    /// Facets of pass 0.
     surface: Surface,
-    /// Facets that the nodes belong to, if known.
+    /// The nodes' own facets, if known.
     own_surface: Option<Surface>,
     passes: Vec<Pass>,
     law: ContactLaw,
@@ -146,26 +145,24 @@ pub struct NodeToFacet<T: Real> {
     /// The cones of the normals of both surfaces at the last search.
     cones: [Cones; 2],
     rows: Rows<T>,
-    /// What the search under way finds.
+    /// Rows of the search in progress.
     found: Rows<T>,
 }
 
 impl<T: Real> NodeToFacet<T> {
-    /// Contact of two surfaces in two passes: the nodes of the facets `one` meet the facets `other`, and the other way
-    /// round.
+    /// Contact of two surfaces in two passes: nodes of the facets `one` with the facets `other`, and the reverse.
     ///
-    /// Two passes treat both surfaces alike, and pass the patch test on meshes that do not match, which
-    /// [one pass](Self::one_pass) fails where the nodes are coarser than the facets. Normals of both surfaces are
-    /// compared as in
-    /// [`facing`](Self::facing). Of two nodes that stand on each other only the first pass makes a row. There are more
-    /// rows than independent gaps where a flat interface closes as a whole: the multipliers are then those of least
-    /// norm. On curved surfaces the gaps of both passes cannot all be zero; neither penetrates. The second pass costs
-    /// its rows: one for each node of `other`, in the search and in the contact problem.
+    /// Two passes treat both surfaces alike. They pass the patch test on meshes that do not match; [one
+    /// pass](Self::one_pass) fails it where the nodes are coarser than the facets. Normals of both surfaces are
+    /// compared as in [`facing`](Self::facing). If two nodes are at the same point, only the first pass makes a row.
+    /// Where a flat interface closes as a whole there are more rows than independent gaps: then the multipliers have
+    /// the least norm. On curved surfaces the gaps of both passes cannot all be zero; neither surface penetrates. The
+    /// second pass costs one row for each node of `other`, in the search and in the contact problem.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; facets name nodes by their index there. Nodes that none names are not read later.
-    /// The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless [`with_law`](Self::with_law) gives
-    /// another.
+    /// dofs of their displacements. Facets list nodes by their index there; nodes of no facet are not read later. The
+    /// two surfaces must not share a node. The law is [`ContactLaw::Rigid`] by default, see
+    /// [`with_law`](Self::with_law).
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -205,12 +202,12 @@ impl<T: Real> NodeToFacet<T> {
         Ok(contact)
     }
 
-    /// Contact of `nodes` with `facets` in one pass: facets do not meet the nodes' own surface, and may pass between
-    /// its nodes. For single nodes, beams and cables, and where the nodes are finer than the facets; on two meshes that
-    /// do not match pressure errs by some percent to a half, however fine they are ([`new`](Self::new) is exact there
-    /// where surfaces are flat).
+    /// Contact of `nodes` with `facets` in one pass: the facets' nodes are not in contact with the nodes' own
+    /// surface, and may pass between its nodes. Use it for single nodes, beams and cables, and where the nodes are
+    /// finer than the facets. On two meshes that do not match the error of the pressure is some percent to a half,
+    /// however fine they are ([`new`](Self::new) is exact there on flat surfaces).
     ///
-    /// `coordinates`, `dofs` and facets are those of [`new`](Self::new); `nodes` names nodes by their index.
+    /// `coordinates`, `dofs` and facets are as in [`new`](Self::new); `nodes` lists nodes by their index.
     ///
     /// # Errors
     ///
@@ -242,7 +239,7 @@ impl<T: Real> NodeToFacet<T> {
         Ok(contact)
     }
 
-    /// Of nodes (ascending) with a surface, before its memory is reserved.
+    /// From nodes (ascending) and a surface; memory for rows is not reserved yet.
     fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface) -> Self {
         Self {
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
@@ -260,17 +257,19 @@ impl<T: Real> NodeToFacet<T> {
         }
     }
 
-    /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. For bodies that
-    /// fold, and for several bodies whose surfaces are given as one.
+    /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. Use it for
+    /// bodies that fold, and for several bodies whose surfaces are given as one.
     ///
-    /// Of the facets of its own body a node does not meet those within one [ring](Self::rings), and those behind it by
-    /// more than half of the material there, as it is thick in the reference configuration. So no body may be inside of
-    /// itself there. Nor does it meet those that do not face it: normals within 60° of each other, as of two surfaces;
-    /// of facets beside it in the reference configuration, by two reaches or two facets, within 102°, but where the
-    /// node is in front of them. Facets that share nodes, with one another or through others, are those of one body,
-    /// and so are the hollows in it: closed parts whose normals point into them. Of two nodes that stand on each other the sharper
-    /// one has a row, or else that with the smaller number. A search reaches as far as any two nodes of the surface
-    /// move against each other within the step: a body that spins fast looks farther than it must.
+    /// Some facets of a node's own body are excluded. These are the facets within one [ring](Self::rings), and facets
+    /// that the node is behind by more than half of the material there, in the reference configuration. So no body
+    /// may penetrate itself in that configuration. Facets that do not face the node are excluded too. As for two
+    /// surfaces, their normal is within 60° of the node's normal. The limit is 102° for facets beside the node in the
+    /// reference configuration, up to two reaches or two facets away, unless the node is in front of them.
+    ///
+    /// Facets connected through shared nodes belong to one body. So do the hollows in it: closed parts whose normals
+    /// point into them. Of two nodes at the same point the sharper one has a row, or else the one with the smaller
+    /// index. The search range includes the largest relative motion of any two nodes of the surface within the step.
+    /// For a body that spins fast it is larger than necessary.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -308,12 +307,12 @@ impl<T: Real> NodeToFacet<T> {
         Ok(contact)
     }
 
-    /// Index of the facet that a row of the last search stands on, in the list of its pass.
+    /// Index of the facet of a row of the last search, in the list of its pass.
     pub fn facet(&self, row: usize) -> usize {
         self.rows.stands[row].facet
     }
 
-    /// How often the lists of facets have been built: many times in a run, and a larger [`skin`](Self::skin) may pay.
+    /// How often the lists of facets have been built. If this is often, a larger [`skin`](Self::skin) may save time.
     pub fn rebuilds(&self) -> usize {
         self.rebuilds
     }
@@ -335,7 +334,7 @@ impl<T: Real> NodeToFacet<T> {
         Ok(())
     }
 
-    /// Room for rows and for their entries: for two a node, as some are in dents.
+    /// Numbers of rows and of their entries to reserve: two rows per node, because some nodes are in dents.
     fn most(&self) -> (usize, usize) {
         let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
         let entries = |(pass, surface): (&Pass, &Surface)| {
@@ -353,12 +352,12 @@ impl<T: Real> NodeToFacet<T> {
         self.surface.finest().min(own)
     }
 
-    /// How far a node that is inside comes out in a step.
+    /// Largest penetration that is recovered in a step.
     fn recovery(&self) -> f64 {
         RECOVERY * self.finest()
     }
 
-    /// Shares of a facet below which closeness to a side or a vertex is rounding.
+    /// Distance from a side or a vertex, as a share of a facet, below which it counts as rounding.
     fn rounding() -> f64 {
         T::epsilon().value().sqrt()
     }

@@ -1,4 +1,4 @@
-//! Which rows there are: a search finds them, and following moves them to where their nodes stand.
+//! The candidates of contact: a search finds them, and `follow` projects their nodes again.
 
 use super::rows::Rows;
 use super::{NodeToFacet, Pass};
@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> NodeToFacet<T> {
-    /// Finds the boxes of all facets, and makes lists of facets valid for the positions now, and for feet as far away
-    /// as `range`.
+    /// Finds the boxes of all facets, and makes the lists of facets valid for the current positions and for closest
+    /// points up to `range` away.
     pub(super) fn update_lists(&mut self, motions: &[Bounds; 2], range: f64) {
         let positions = &self.nodes.positions;
         let own = self.own_surface.as_ref().filter(|_| !self.vicinity.is_of_itself());
@@ -28,8 +28,8 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass at t, in the order of its nodes: of those near enough in the box given, which the other
-    /// body makes with its velocities in theirs within the time `ahead`.
+    /// The rows of one pass at t, in the order of its nodes. `near` is the box of the other body, widened by the
+    /// search range, and `speeds` are the boxes of the velocities of both bodies. They count for the time `ahead`.
     pub(super) fn find_rows(
         &mut self,
         pass: usize,
@@ -65,7 +65,7 @@ impl<T: Real> NodeToFacet<T> {
             Some(Ground { boxes: Some(&passes[pass].boxes), cones: [of(pass), of(1 - pass)], ..ground })
         };
         let Some(ground) = ground_of(pass) else { return };
-        // What the facets' nodes stand on, if they are looked at: of two surfaces that is the other pass.
+        // The pass of the facets' own nodes, if there is one: for two surfaces the other pass.
         let back = if kin.is_some() { Some((pass, ground)) } else { Some(1 - pass).zip(ground_of(1 - pass)) };
         let back = back.filter(|_| kin.is_some() || passes.len() > 1);
         let way_of = |pass: usize, node: usize| {
@@ -106,9 +106,9 @@ impl<T: Real> NodeToFacet<T> {
         }
     }
 
-    /// The rows there are, where their nodes stand now.
+    /// Linearizes the existing rows at the current positions of their nodes.
     pub(super) fn move_rows(&mut self, t: f64, u: &[T]) -> Result<()> {
-        /// Gap, in shares of the reach, above which a row surely does not press.
+        /// Gap, as a share of the reach, above which a row surely does not press.
         const OPEN: f64 = 0.01;
         let Self { surface, own_surface, nodes, passes, vicinity, rows, found, .. } = self;
         let Vicinity { reach, thickness, .. } = &*vicinity;
@@ -125,7 +125,7 @@ impl<T: Real> NodeToFacet<T> {
             let stands = &rows.stands[first..next];
             let kept = Kept { reach, motion: motions[1 - pass], thick };
             let ground = ground((pass, passes), surfaces, vicinity, places, kept, Self::rounding());
-            // The list of the node has all facets whose surface is as near as this.
+            // The list of the node is complete for surfaces up to this distance.
             let known = reach.known_around(node, positions[node], &motions[1 - pass]) - thick;
             let ground = ground.filter(|_| known > 0.0);
             let Stand { place, facet, .. } = stands[0];
@@ -143,11 +143,11 @@ impl<T: Real> NodeToFacet<T> {
                         Some(stand) => found.push(group[k], (&stand, slope), vertices, |node| nodes.places(node), u),
                         None => found.keep(rows, row),
                     },
-                    // There is nothing near that it could press on.
+                    // No facet is near.
                     None if known > 0.0 && gap_of(rows, row, places.1.factor, u).value() > OPEN * reach.least() => {
                         found.keep(rows, row);
                     }
-                    // (The first stands for all.)
+                    // The first row of the node decides for all.
                     None if k > 0 => found.keep(rows, row),
                     None => {
                         let contact = ContactId { constraint: 0, feature: node, candidate: pass };
@@ -160,13 +160,13 @@ impl<T: Real> NodeToFacet<T> {
     }
 }
 
-/// The gap of a row at u, where offsets have this factor.
+/// The gap of a row at u, with this factor of the offsets.
 pub(super) fn gap_of<T: Real>(rows: &Rows<T>, row: usize, factor: f64, u: &[T]) -> T {
     let stand = &rows.stands[row];
     rows.affine.gap(row, u) - T::of((factor - stand.factor) * stand.offset)
 }
 
-/// The candidate of a row beside the one that a node has in a pass.
+/// The candidate number of an additional row of a node in a dent.
 fn beside_of(pass: usize, facet: usize) -> usize {
     pass + 2 * (1 + facet)
 }
@@ -176,7 +176,7 @@ pub(super) fn pass_of(candidate: usize) -> usize {
     candidate % 2
 }
 
-/// What the nodes of a pass stand on.
+/// The nodes of a pass and the surface onto which they are projected.
 fn ground<'a>(
     (pass, passes): (usize, &'a [Pass]),
     (surface, own_surface): (&'a Surface, Option<&'a Surface>),

@@ -1,4 +1,4 @@
-//! Nodes on facets as a constraint: what it says of its rows, its search, gaps and rates.
+//! Contact of nodes with facets as a constraint: its rows, search, gaps and rates.
 
 use super::NodeToFacet;
 use super::candidates::{gap_of, pass_of};
@@ -53,7 +53,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
         let near = self.vicinity.reach.least() + growth + ahead * speeds[0].farthest(&speeds[1]);
         let range = near + thick;
-        // Facets go on a little beyond the rim.
+        // Facets extend a little beyond the rim.
         let wide = range + boxes.iter().map(overhang).fold(0.0, f64::max);
         for pass in &mut self.passes {
             pass.clearance.fill(near);
@@ -72,7 +72,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.nodes.dofs().len())?;
-        // A trial state that is not finite: the gaps say so.
+        // If a trial state is not finite, the gaps are not finite either.
         if self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }

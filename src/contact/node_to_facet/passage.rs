@@ -1,4 +1,4 @@
-//! What nodes have passed through in a step: their ways against facets that move.
+//! Checks whether nodes have passed through facets in a step: their paths against facets that move.
 
 use super::NodeToFacet;
 use super::candidates::pass_of;
@@ -7,18 +7,18 @@ use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently}
 use crate::error::Result;
 use crate::real::Real;
 
-/// Share of the smallest facet that a node may move against the other surface without being looked at: what it can pass
-/// by then is not smaller than the mesh.
+/// Relative displacement, as a share of the smallest facet, up to which a node is not checked: it cannot pass
+/// anything larger than that.
 const FINE: f64 = 0.125;
 
-/// The same above which it is looked at what a node that has its row has gone through, and the normal along which it
-/// was stopped: below, rows let nodes in over an edge only, and there the normal is anyone's.
+/// The same limit for two checks of nodes with rows: whether they went through a facet, and along which normal they
+/// were stopped. At smaller displacements a row lets its node in only over an edge, where the normal is not unique.
 const COARSE: f64 = 0.6;
 
-/// Share of a way that may go in over a convex corner and out again.
+/// Share of a path that may enter over a convex corner and leave again.
 const SHALLOW: f64 = 0.05;
 
-/// Share of the smallest facet below which a depth is rounding.
+/// Depth, as a share of the smallest facet, below which it is rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// A node and the surface of its pass, at the start and at the end of a step.
@@ -26,17 +26,17 @@ struct Crossing<'a> {
     grounds: [Ground<'a>; 2],
     place: usize,
     node: usize,
-    /// The facet that its row stands on, if it has one.
+    /// The facet of its row, if it has one.
     likely: Option<usize>,
-    /// A bound of its way against the surface.
+    /// A bound of its displacement relative to the surface.
     way: f64,
     law: ContactLaw,
-    /// How far it comes out in a step.
+    /// Largest penetration that is recovered in a step.
     recovery: f64,
 }
 
 impl<T: Real> NodeToFacet<T> {
-    /// Refuses a step in which a node has gone through the other surface, or was stopped where there is none.
+    /// Rejects a step in which a node went through the other surface, or was stopped away from it.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let mut ends = std::mem::take(&mut self.ends);
         let result = self.look_along(step, &mut ends);
@@ -55,7 +55,7 @@ impl<T: Real> NodeToFacet<T> {
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        // (Of the rows of a node in a dent the first one tells.)
+        // For a node in a dent only the first row is checked.
         let rows = self.rows.identities.iter().copied().enumerate();
         let mut rows = rows.filter(|&(_, (_, candidate))| candidate == pass_of(candidate)).peekable();
         for (pass, (list, surface)) in self.passes.iter().zip(surfaces.into_iter().flatten()).enumerate() {
@@ -66,7 +66,7 @@ impl<T: Real> NodeToFacet<T> {
                 if way <= list.clearance[place] || way <= FINE * surface.finest() {
                     continue;
                 }
-                // Lists know what a node may meet, unless it was faster than its velocity promised.
+                // Lists are complete unless the node was faster than its velocity at the search.
                 let lists = Some(&list.lists).filter(|_| row.is_some() && way <= self.vicinity.reach.listed());
                 let [start, end] = [0, 1].map(|k| Ground {
                     nodes: &list.nodes,
@@ -101,8 +101,8 @@ impl Crossing<'_> {
         &self.grounds[0].surface.facets()[facet]
     }
 
-    /// Says what is wrong with the way of the node, how long it is, and the gap at its start. `closed` are the flags of
-    /// its row at the start and at the end, if it has one.
+    /// Returns the reason for a rejection, the length of the path of the node, and the gap at its start. `closed`
+    /// says whether its row, if any, was closed at the start and at the end.
     fn look_at(
         &self,
         closed: Option<[bool; 2]>,
@@ -119,7 +119,7 @@ impl Crossing<'_> {
                 false => Ok(()),
             };
         };
-        // The way against the point of the facet where the node stands, and the gap that follows from it.
+        // The displacement relative to the closest point on the facet, and the linearized gap at the end.
         let against = |vector: &dyn Fn(usize) -> Point| {
             let nodes = self.facet(from.facet).nodes;
             let carried = nodes.iter().zip(from.weights);
@@ -128,7 +128,7 @@ impl Crossing<'_> {
         let way = against(&|node| sub(end.positions[node], start.positions[node]));
         let length = norm(way);
         let coarse = length > COARSE * start.surface.finest();
-        // (With what the offset has grown by.)
+        // Includes the growth of the offset.
         let linear = gap + dot(from.normal, way) - (end.offsets.factor - from.factor) * from.offset;
         if let Some([false, true]) = closed {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
@@ -144,26 +144,26 @@ impl Crossing<'_> {
                 return Err(("was stopped along a normal that is not the one where it met the surface", length, gap));
             }
         }
-        // Inside, as its row says; or on the way around an edge that it was at.
+        // Inside as the row predicts, or around an edge that the node was near.
         let explained = |to: Stand| {
             let turn = dot(from.normal, to.normal);
             let inside = to.gap < 0.0 && linear - to.gap <= LARGEST_MISS * length && turn > 0.5;
             inside || gap.max(-to.gap) < LARGEST_MISS * length && turn > -0.5
         };
-        // What is in already, because an edge has come in beside it for instance, comes out as it may.
+        // A node that is already inside, for instance because an edge has penetrated beside it, may leave freely.
         let outside = gap > -ROUNDING * start.surface.finest();
         if coarse && outside && !after.is_some_and(explained) && self.passes(length) {
             return Err(("went through a facet", length, gap));
         }
         let turned = after.is_some_and(|to| dot(from.normal, to.normal) < 0.0);
-        // (Under a rigid law what is found inside comes out slowly.)
+        // Rigid laws recover a penetration slowly.
         if self.law.is_compliant() && gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
             return Err(("went through the body that it was in", length, gap));
         }
         Ok(())
     }
 
-    /// Whether the node goes through a facet that it may meet, from the front to the back.
+    /// Whether the node passes a facet that it may be in contact with, from the front to the back.
     fn passes(&self, length: f64) -> bool {
         let Self { grounds: [start, end], place, node, .. } = *self;
         let own_normal = start.own_normal(place);
@@ -191,7 +191,7 @@ impl Crossing<'_> {
     }
 }
 
-/// Whether a point goes through a triangle, or a segment in the plane, from the front to the back; both move in
+/// Whether a point passes through a triangle, or a segment in the plane, from the front to the back. Both move in
 /// straight lines.
 fn pierces(
     ends: [Point; 2],
@@ -213,8 +213,8 @@ fn pierces(
         shape.normal(&middle).map(|normal| (dot(normal, sub(p, shape.corner(0))), normal))
     };
     let (Some((before, normal)), Some((after, _))) = (height(0.0), height(1.0)) else { return false };
-    // What goes in so little, as over a convex corner, has not gone through. (A way is not shorter than its share in
-    // height.)
+    // A node that ends at a small depth, as over a convex corner, has not gone through. Its path is at least as long
+    // as its change in height.
     if !(before >= 0.0 && after < -SHALLOW * length.min(before - after) && meets(normal)) {
         return false;
     }

@@ -1,10 +1,10 @@
-//! The rows of nodes on facets: entries of G, where the nodes stand, and the gaps there.
+//! The rows of nodes on facets: entries of G, projections of the nodes, and gaps there.
 
 use crate::contact::affine_rows::AffineRows;
 use crate::contact::surface::{Point, Stand, add_scaled};
 use crate::real::Real;
 
-/// The rows that a search found, where they are linearized.
+/// The rows of a search, at their point of linearization.
 #[derive(Debug)]
 pub(super) struct Rows<T> {
     pub(super) affine: AffineRows<T>,
@@ -28,7 +28,7 @@ impl<T: Real> Rows<T> {
         self.stands.clear();
     }
 
-    /// Appends the row of a node on the vertices of a facet, with the derivatives of their offsets, if they have any.
+    /// Appends the row of a node on the vertices of a facet, with the derivatives of their offsets, if any.
     pub(super) fn push<'a>(
         &mut self,
         (node, pass): (usize, usize),
@@ -47,7 +47,7 @@ impl<T: Real> Rows<T> {
         self.stands.push(*stand);
     }
 
-    /// Appends a row as another list has it.
+    /// Appends a copy of a row of another list.
     pub(super) fn keep(&mut self, other: &Self, row: usize) {
         self.affine.keep(&other.affine, row);
         self.identities.push(other.identities[row]);

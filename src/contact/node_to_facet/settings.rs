@@ -1,4 +1,4 @@
-//! What a constraint of nodes on facets can be told: laws, friction, offsets, how far it looks, what is met.
+//! Settings of a contact of nodes with facets: law, friction, offsets, search range and excluded facets.
 
 use super::NodeToFacet;
 use crate::contact::ContactLaw;
@@ -9,24 +9,24 @@ use crate::error::Result;
 use crate::real::Real;
 
 impl<T: Real> NodeToFacet<T> {
-    /// How many rings of facets around a node it does not meet, of [its own surface](Self::of_itself): 0 are the facets
-    /// that have the node, 1 those that share a node with one of them, and so on. By default 1. It has no meaning for
-    /// two surfaces.
+    /// For [a surface against itself](Self::of_itself), the number of rings of facets around a node that are
+    /// excluded: 0 are the facets of the node, 1 also the facets that share a node with these, and so on. The default
+    /// is 1. Without effect for two surfaces.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
         self.vicinity.set_rings(rings);
         self
     }
 
-    /// The law of all rows.
+    /// Sets the law of all rows.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of a node against the point of the facet
-    /// that it stands on: bodies that turn together do not slip.
+    /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the velocity of a node relative to its closest point
+    /// on the facet: bodies that turn together do not slip.
     ///
     /// ```
     /// use contact_dynamics::contact::{Contacts, NodeToFacet};
@@ -50,17 +50,19 @@ impl<T: Real> NodeToFacet<T> {
         self
     }
 
-    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh, and of nodes that
-    /// belong to no facet how thick they are: half the thickness of a shell whose facets are its middle surface, the
-    /// thickness of a coating, the radius of a cable; negative if they lie inside. Between nodes the shape functions
-    /// interpolate. The gap is the distance less the offsets of the node and of the closest point of the facet, and a
-    /// node meets the facet whose surface is closest. What a varying offset changes by as the closest point slides is
-    /// in the rows: forces then have a share along the facet, and keep linear and angular momentum.
+    /// Sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the
+    /// thickness of a shell whose facets are its middle surface, the thickness of a coating; negative if they lie
+    /// inside. For nodes without facets it is their own thickness, for instance the radius of a cable. Between nodes
+    /// the shape functions interpolate.
     ///
-    /// Forces act on nodes and facets: that a friction force acts at a distance from the middle surface is left out. In
-    /// dents sides are found that share a vertex with the closest facet: so in a dent of 90° with an offset of no more
-    /// than a facet's length. [Of itself](Self::of_itself) a body meets what is near beyond its [rings](Self::rings),
-    /// so a fold tighter than its offset is inside of itself.
+    /// The gap is the distance less the offsets of the node and of the closest point of the facet. The closest facet
+    /// is the one whose surface is closest. Rows include the change of a varying offset as the closest point slides.
+    /// So forces have a component along the facet, and conserve linear and angular momentum.
+    ///
+    /// Forces act on nodes and facets; the lever arm of a friction force about the middle surface is left out. In
+    /// dents only sides that share a vertex with the closest facet are found. In a dent of 90°, that suffices for
+    /// offsets up to a facet's length. In contact [with itself](Self::of_itself) a fold tighter than its offset
+    /// penetrates itself, because facets beyond the [rings](Self::rings) count.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -79,26 +81,27 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    /// [`Error::Dimension`] unless there is one offset per node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         self.vicinity.set_offsets(offsets, self.nodes.coordinates.len())?;
         Ok(self)
     }
 
-    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
-    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration, as
+    /// Scales all [`offsets`](Self::offsets) in time: by the factor `factors[0]` until `times[0]`, by `factors[1]`
+    /// from `times[1]` on. In between the factor is smooth, without a jump of velocity or acceleration, as in
     /// [`Mortar::ramp`](crate::contact::Mortar::ramp).
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    /// [`Error::Parameter`] unless all values are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.vicinity.set_ramp(times, factors)?;
         Ok(self)
     }
 
-    /// How far (length) outside and inside of the facets a node is found at least; by default the mean size of the
-    /// facets. What the velocities bring near within a step is found as well, so that no reach must fit the speed.
+    /// Sets the least distance (length) outside and inside of the facets at which nodes are found; the default is the
+    /// mean size of the facets. The motion within a step is added by the velocities, so that the reach need not fit
+    /// the speed.
     ///
     /// # Errors
     ///
@@ -108,8 +111,8 @@ impl<T: Real> NodeToFacet<T> {
         Ok(self)
     }
 
-    /// How far (length) nodes of the two surfaces may move relative to each other before lists of facets are built
-    /// anew; if not given, half of what is searched. It changes the cost, not the result.
+    /// Sets how far (length) nodes of the two surfaces may move relative to each other before lists of facets are
+    /// rebuilt; the default is half of the search range. It changes the cost, not the result.
     ///
     /// # Errors
     ///
@@ -119,15 +122,15 @@ impl<T: Real> NodeToFacet<T> {
         Ok(self)
     }
 
-    /// Tells the facets that the nodes belong to: a node then meets only facets turned against its own normal, which is
-    /// the mean of its facets' normals (refused: an angle of less than 60° between the two).
+    /// Sets the facets of the nodes' own surface. Then a node is in contact only with facets that face it: the angle
+    /// between their normal and its own, the mean of its facets' normals, must be at least 60°.
     ///
-    /// This keeps a node from the far side of a thin body, and from facets that it comes to from behind; of the whole
-    /// surface of its body also from facets that it could meet only through that body.
+    /// This prevents contact with the far side of a thin body, and with facets that a node approaches from behind.
+    /// With the whole surface of its body it also prevents contact through that body.
     ///
     /// # Errors
     ///
-    /// As those of [`one_pass`](Self::one_pass) about facets.
+    /// Those of [`one_pass`](Self::one_pass) about facets.
     pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
         let own = Surface::of_facets(facets, self.nodes.dimension, &self.nodes.coordinates)?;
         self.own_surface = Some(own);
