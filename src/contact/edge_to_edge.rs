@@ -1,4 +1,4 @@
-//! Contact of the edges of one deforming body with those of another.
+//! Contact of the edges of one deforming body with the edges of another.
 
 mod edges;
 mod lines;
@@ -15,10 +15,10 @@ use lines::Crossing;
 use pairs::{LEAST_SINE, Pair};
 use rows::Rows;
 
-/// The angle by which a surface turns around an edge, if not given: 30°.
+/// The default angle by which a surface turns around an edge: 30°.
 pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
 
-/// Refuses what is no angle by which a surface turns.
+/// Rejects a value that is not an angle by which a surface can turn.
 pub(super) fn check_angle(angle: f64) -> Result<()> {
     match (0.0..=std::f64::consts::PI).contains(&angle) {
         true => Ok(()),
@@ -26,55 +26,54 @@ pub(super) fn check_angle(angle: f64) -> Result<()> {
     }
 }
 
-/// Contact of the edges of two deforming surfaces in three dimensions, where they cross: beside
-/// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not see it, or in a
+/// Contact of the edges of two deforming surfaces in three dimensions, where they cross. It complements
+/// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not detect crossing edges, or is a part of a
 /// [`BodyContact`](super::BodyContact).
 ///
 /// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)).
-/// The lines through an edge e of the first surface and an edge f of the second are closest in x_e and x_f. The pair is
-/// in contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is one of
-/// the second body at f, between the normals of the two facets beside f, and −n one of the first body at e: then n is a
-/// normal of the Minkowski difference of the bodies, and which of the two signs fits is known. The gap is
+/// The lines through an edge e of the first surface and an edge f of the second are closest at x_e and x_f. The pair
+/// is in contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is a
+/// normal of the second body at f, between the normals of the two facets beside f, and −n is a normal of the first
+/// body at e. Then n is a normal of the Minkowski difference of the bodies, which determines the sign. The gap is
 ///
 /// `g = n · (x_e − x_f)` (length; positive outside).
 ///
-/// Its row of G is n times (1 − s, s) on the ends of e and −n times (1 − t, t) on those of f, s and t the places of x_e
-/// and x_f along them. That is the derivative of g, for n is orthogonal to both edges. x_e − x_f is parallel to n:
-/// forces conserve momentum and angular momentum at the configuration where rows are linearized.
+/// Its row of G is n times (1 − s, s) on the ends of e and −n times (1 − t, t) on the ends of f, with the positions s
+/// of x_e and t of x_f along them. This is the derivative of g, because n is orthogonal to both edges. x_e − x_f is
+/// parallel to n: forces conserve momentum and angular momentum at the configuration at which rows are linearized.
 ///
-/// # Beside which contact
+/// # Complementary contact
 ///
-/// A pair of edges keeps apart what crosses between nodes; a corner on a facet, a face on a face, edges that are
-/// parallel within 2.9° (sine 0.05) are left to nodes and facets. (Nodes let such edges sink into each other by no more
-/// than half an edge times that sine.) Where an edge ends on another one, both speak: redundant rows share their
-/// multipliers in the least norm.
+/// A pair of edges resists crossing between nodes. Nodes on facets resist a corner on a facet, a face on a face, and
+/// edges that are parallel within 2.9° (sine 0.05); such edges penetrate by at most half an edge times that sine.
+/// Where an edge ends on another one, both constraints have a row: redundant rows have the multipliers of least norm.
 ///
 /// # Linearization
 ///
-/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step ([`search`](ContactConstraint::search)):
-/// edges that meet, and those that may come to meet within the step, by their velocities and a tenth of an edge. In
-/// between gaps are affine, and rows [`follow`](ContactConstraint::follow) the contact of the step.
-/// [`rates`](ContactConstraint::rates) have the second derivative of g along the motion. Where the closest points lie
-/// beyond an end by a share x of an edge of length l, the gap is larger than that of the lines by 2 l x²/(x + 0.1):
-/// gaps and rows are continuous where edges come to meet or slide off each other. Geometry is computed in `f64` in
-/// every run.
+/// As for [`NodeToFacet`](super::NodeToFacet), candidates are found once a step
+/// ([`search`](ContactConstraint::search)): edges that meet, and edges that may meet within the step, by their
+/// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
+/// contact of the step. [`rates`](ContactConstraint::rates) contain the second derivative of g along the motion. If
+/// the closest points lie beyond an end by a share x of an edge of length l, the gap is that of the lines plus 2 l
+/// x²/(x + 0.1): gaps and rows are continuous where edges begin to meet or slide off each other. Geometry is computed
+/// in `f64` in every run.
 ///
-/// Edges that touch, by 2 % of the shorter one, are in contact even if the normal is up to 30° beside those of the
-/// facets: in the dent that an edge makes it may be none of theirs.
+/// Edges that touch, within 2 % of the shorter one, are in contact even if the normal is up to 30° outside the
+/// normals of the facets: in the dent that an edge makes, the normal may lie outside of them.
 ///
-/// Edges that a search finds in each other deeper than 1e-4 of the shorter one, because a body has come in
-/// elsewhere, come out by so much in a step ([`Contact::recovery`](super::Contact::recovery)).
+/// If a search finds edges that penetrate by more than 1e-4 of the shorter one, because a body has penetrated
+/// elsewhere, that depth is the penetration recovered per step ([`Contact::recovery`](super::Contact::recovery)).
 ///
-/// A step is refused ([`Error::PassedThrough`], which a smaller step mends) in which edges that move by more than an
-/// eighth of the smallest one have gone into each other by more than a tenth of their way, taken as straight, or were
+/// A step is rejected ([`Error::PassedThrough`], and a smaller step helps) if edges that move by more than an eighth
+/// of the smallest one have penetrated each other by more than a tenth of their path, taken as straight, or were
 /// stopped apart.
 ///
 /// # Known failure
 ///
-/// - An open rim is no edge: what is behind it is not known. Give the whole surface of a body.
-/// - Edges that are concave, or that turn by less than the angle, are seen by nodes and facets only.
-/// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is another contact:
-///   what a corrector or a friction law remembers of it begins anew.
+/// - An open rim is not an edge, because the surface behind it is unknown. Give the whole surface of a body.
+/// - Concave edges, and edges with a smaller angle, have rows only from nodes and facets.
+/// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is a new contact:
+///   correctors and friction laws have no history of it.
 /// - Where an edge slides from one side of its mesh to the next it loses some of its speed along it, less than 0.5 %
 ///   over two nodes in `tests/contact/edges.rs`.
 ///
@@ -115,28 +114,28 @@ pub struct EdgeToEdge<T: Real> {
     vicinity: Vicinity,
     /// Nodes of the edges, by edge.
     ends_of: [Vec<[usize; 2]>; 2],
-    /// For each dof whether an edge has it.
+    /// Whether each dof belongs to an edge.
     acts: Vec<bool>,
-    /// The shortest edge, in the reference coordinates.
+    /// The length of the shortest edge, in the reference configuration.
     finest: f64,
     law: ContactLaw,
     friction: f64,
-    /// Edges of the second surface near each of the first.
+    /// Edges of the second surface near each edge of the first.
     neighborhood: Neighborhood,
     /// Positions at the start and at the end of a step, by node.
     ends: [Vec<Point>; 2],
     rows: Rows<T>,
-    /// What the search under way finds.
+    /// Rows of the search in progress.
     found: Rows<T>,
 }
 
 impl<T: Real> EdgeToEdge<T> {
-    /// Contact of the edges of the facets `one` with those of the facets `other`.
+    /// Contact of the edges of the facets `one` with the edges of the facets `other`.
     ///
-    /// `coordinates` are the reference coordinates of all nodes of a mesh, and `dofs` the dofs of their displacements;
-    /// facets are triangles and quadrilaterals that name nodes by their index there, and their normals point out of the
-    /// bodies ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
-    /// [`with_law`](Self::with_law) gives another. A surface without an edge, as a ball's, is no error: there are no
+    /// `coordinates` are the reference coordinates of all nodes of a mesh, and `dofs` the dofs of their
+    /// displacements. Facets are triangles and quadrilaterals that list nodes by their index there, and their normals
+    /// point out of the bodies ([`Facet`]). The two surfaces must not share a node. The law is [`ContactLaw::Rigid`]
+    /// by default, see [`with_law`](Self::with_law). A surface without edges, as of a ball, is accepted: it has no
     /// candidates.
     ///
     /// # Errors
@@ -157,13 +156,13 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(contact)
     }
 
-    /// Contact of the edges of a surface with each other, of a body that folds or of several bodies whose surfaces are
-    /// given as one: beside [`NodeToFacet::of_itself`](super::NodeToFacet::of_itself), or in a
+    /// Contact of the edges of a surface with each other, for a body that folds or for several bodies whose surfaces
+    /// are given as one. It complements [`NodeToFacet::of_itself`](super::NodeToFacet::of_itself), or is a part of a
     /// [`BodyContact::of_itself`](super::BodyContact::of_itself).
     ///
-    /// Each pair of edges is met once, the one of the smaller index being the first. Edges do not meet those beside
-    /// whose facets one of their own nodes is within one [ring](Self::rings), nor any that is behind one of their nodes
-    /// by more than half of the material there, as it is thick in the reference configuration.
+    /// Each pair of edges is listed once, with the smaller index first. Two edges are excluded if a node of one is
+    /// within one [ring](Self::rings) of a facet beside the other, and if one is behind a node of the other by more
+    /// than half of the material there, in the reference configuration.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -204,7 +203,7 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(contact)
     }
 
-    /// Of two surfaces, whose edges are still to be found.
+    /// From two surfaces; the edges are found later.
     fn between(nodes: Nodes, surfaces: [Surface; 2]) -> Self {
         Self {
             ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
@@ -223,19 +222,19 @@ impl<T: Real> EdgeToEdge<T> {
         }
     }
 
-    /// How many rings of facets around the nodes of an edge it does not meet the edges of, of
-    /// [its own surface](Self::of_itself), as [`NodeToFacet::rings`](super::NodeToFacet::rings). By default 1.
+    /// For [a surface against itself](Self::of_itself), sets the number of rings of facets around the nodes of an
+    /// edge whose edges are excluded, as [`NodeToFacet::rings`](super::NodeToFacet::rings). The default is 1.
     #[must_use]
     pub fn rings(mut self, rings: usize) -> Self {
         self.vicinity.set_rings(rings);
         self
     }
 
-    /// Rounds the edges: how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh,
-    /// as [`NodeToFacet::offsets`](super::NodeToFacet::offsets). The gap is that of the lines less the radii of both
-    /// edges where they are closest, which are linear between nodes. Edges of a surface that lies inside of its facets
-    /// (negative offsets) are found a little early, by up to 0.4 of the offset at right angles: between its faces a
-    /// body is smaller by more than that.
+    /// Rounds the edges: sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the
+    /// mesh, as [`NodeToFacet::offsets`](super::NodeToFacet::offsets). The gap is the gap of the lines less the radii
+    /// of both edges at the closest points, which are linear between nodes. With negative offsets (a surface inside
+    /// of its facets) edges are in contact slightly early, by up to 0.4 of the offset at right angles, because
+    /// between its faces the body is smaller by more than the offset.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -258,39 +257,39 @@ impl<T: Real> EdgeToEdge<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node).
+    /// [`Error::Dimension`] unless there is one offset per node of the mesh; [`Error::NotFinite`] (index: node).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         self.vicinity.set_offsets(offsets, self.nodes.coordinates.len())?;
         Ok(self)
     }
 
-    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time, as [`Mortar::ramp`](super::Mortar::ramp).
+    /// Scales all [`offsets`](Self::offsets) in time, as [`Mortar::ramp`](super::Mortar::ramp).
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    /// [`Error::Parameter`] unless all values are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.vicinity.set_ramp(times, factors)?;
         Ok(self)
     }
 
-    /// The law of all rows.
+    /// Sets the law of all rows.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the velocity of the closest point of the first edge
-    /// against that of the second, as material points.
+    /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the velocity of the closest material point of the
+    /// first edge relative to that of the second.
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
     }
 
-    /// How far (length) outside and inside of each other edges are found at least; by default the mean size of the
-    /// facets, of the coarser surface. What the velocities bring near within a step is found as well.
+    /// Sets the least distance (length), outside and inside, at which edges are found; by default the mean size of
+    /// the facets, of the coarser surface. The motion within a step is added by the velocities.
     ///
     /// # Errors
     ///
@@ -300,8 +299,8 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(self)
     }
 
-    /// How far (length) the surfaces may move relative to each other before lists of near edges are built anew; if not
-    /// given, half of what is searched. It changes the cost, not the result.
+    /// Sets how far (length) the surfaces may move relative to each other before lists of near edges are rebuilt; the
+    /// default is half of the search range. It changes the cost, not the result.
     ///
     /// # Errors
     ///
@@ -311,24 +310,24 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(self)
     }
 
-    /// What an edge is: a side around which the surface turns by more than `angle` (radians, between the normals of its
-    /// facets in the reference coordinates) to a convex one; 30° if not given.
+    /// Sets the angle (radians) from which a convex side is an edge: the angle between the normals of its facets in
+    /// the reference configuration; 30° by default.
     ///
-    /// What turns less is left to nodes on facets. Two edges of length l that cross in their middles then sink into
-    /// each other by ½ l tan(½ `angle`) at most before a node touches: by 13 % of an element at 30°. Smaller angles
-    /// make edges of the sides of a mesh on a curved surface, at the cost of a search among all of them.
+    /// Sides with smaller angles are left to nodes on facets. Two edges of length l that cross at their middles then
+    /// penetrate by at most ½ l tan(½ `angle`) before a node touches: by 13 % of an element at 30°. With a smaller
+    /// angle the sides of a mesh on a curved surface become edges, and all of them are searched.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless from 0 to π.
+    /// [`Error::Parameter`] unless the angle is from 0 to π.
     pub fn sharp(mut self, angle: f64) -> Result<Self> {
         check_angle(angle)?;
         self.find_edges(angle)?;
         Ok(self)
     }
 
-    /// The nodes of the edges of both surfaces, each edge with the smaller number first, in ascending order: features
-    /// are indices in the first list, candidates in the second.
+    /// The nodes of the edges of both surfaces, the smaller node of each edge first, in ascending order: features are
+    /// indices in the first list, candidates in the second.
     pub fn edges(&self) -> [&[[usize; 2]]; 2] {
         self.ends_of.each_ref().map(Vec::as_slice)
     }
@@ -366,7 +365,7 @@ impl<T: Real> EdgeToEdge<T> {
         Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) }
     }
 
-    /// Makes lists of near edges valid for the positions now, and for distances up to `range`.
+    /// Makes lists of near edges valid for the current positions, and for distances up to `range`.
     fn update_lists(&mut self, range: f64) {
         let motions = self.vicinity.reach.motions(&self.nodes);
         let Some(listed) = self.vicinity.reach.renew(&motions, range, &self.nodes.positions) else { return };
@@ -401,7 +400,7 @@ impl<T: Real> EdgeToEdge<T> {
     }
 }
 
-/// The edges of two surfaces, or twice those of one, at some time.
+/// The edges of two surfaces, or the edges of one surface twice, at some time.
 #[derive(Clone, Copy)]
 struct Sides<'a> {
     edges: &'a [Vec<Edge>; 2],
@@ -416,7 +415,7 @@ impl<'a> Sides<'a> {
         Pair { edges, surfaces, offsets: self.offsets, depth: self.depth(edges) }
     }
 
-    /// How deep two edges may lie in each other and be in contact, for the material behind both.
+    /// The largest penetration of two edges in contact, by the material behind both.
     fn depth(&self, edges: [&Edge; 2]) -> f64 {
         let material = &self.vicinity.material[..];
         let ([one, .., other] | [one @ other]) = material else { return f64::INFINITY };
@@ -428,7 +427,8 @@ impl<'a> Sides<'a> {
         if is_one_body { behind.min(beyond) } else { behind + beyond }
     }
 
-    /// Two edges that may meet: of one surface each pair once, and none whose facets are near each other on it.
+    /// A pair of edges, unless it is excluded: for a surface against itself each pair counts once, and edges with
+    /// facets near each other on the surface do not count.
     fn meeting(&self, [first, second]: [usize; 2]) -> Option<Pair<'a>> {
         let apart = self.vicinity.kin.as_ref().is_none_or(|kin| {
             let keeps = |one: &Edge, other: &Edge| {
@@ -499,7 +499,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        // A trial state that is not finite: the gaps say so.
+        // If a trial state is not finite, the gaps are not finite either.
         if self.rows.pairs.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
@@ -509,7 +509,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         found.clear();
         for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {
             let pair = sides.pair(index);
-            // Edges that have become parallel: the row stays as it was.
+            // If the edges have become parallel, the row stays.
             let crossing = Crossing::of(pair.ends(&at)).filter(|crossing| crossing.sine >= 0.5 * LEAST_SINE);
             match crossing.map(|crossing| crossing.as_seen_along(before.normal)) {
                 Some(crossing) => {

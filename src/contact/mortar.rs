@@ -1,4 +1,4 @@
-//! Contact of two deforming surfaces by weighted gaps: segment to segment.
+//! Contact of two deforming surfaces by weighted gaps (mortar method, segment to segment).
 
 mod bonds;
 mod dual;
@@ -23,77 +23,77 @@ use integrals::Integrals;
 use pairs::Pairs;
 use rows::{Made, Rows};
 
-/// The largest angle (radians) by which a surface may turn around a convex side: 60°, and 0.6° for rounding, so that a
-/// circle of six segments is accepted in both precisions.
+/// The largest angle (radians) by which a surface may turn around a convex side: 60°, and 0.6° for rounding, so that
+/// a circle of six segments is accepted in both precisions.
 const CORNER: f64 = std::f64::consts::FRAC_PI_3 + 0.01;
 
-/// Share of the reach above which a row that nothing lies over any more is open.
+/// Gap, as a share of the reach, above which an uncovered row is open.
 const OPEN: f64 = 0.01;
 
-/// Share of the smallest facet that surfaces may have moved against each other since the search where such a row goes
-/// on as it was: what slides off the rim ends its step.
+/// Relative motion since the search, as a share of the smallest facet, up to which an uncovered row stays as it was:
+/// a node that slides off the rim finishes its step.
 const BEYOND: f64 = 0.25;
 
-/// Contact of two deforming surfaces whose nodes need not match: gaps weighted over the facets of one surface, the
-/// slave, against those of the other, the master. Segments in two dimensions, triangles and bilinear quadrilaterals in
-/// three, and those of second order ([`Facet`]).
+/// Contact of two deforming surfaces whose nodes need not match. Gaps are weighted over the facets of one surface,
+/// the slave, against the facets of the other, the master. Facets are segments in two dimensions, triangles and
+/// bilinear quadrilaterals in three, or facets of second order ([`Facet`]).
 ///
-/// The gap of a slave node is the mean of the distance between the surfaces, with the node's shape function N as
-/// weight, over the part of the slave surface that the master covers:
+/// The gap of a slave node is the mean distance between the surfaces, weighted with the node's shape function N, over
+/// the part of the slave surface that the master covers:
 ///
 /// g = ∫ N (x_m − x_s)·n dA / ∫ N dA (length; positive outside),
 ///
-/// where n is the normal in the middle of the slave facet, and x_m the point where the ray along n from x_s meets the
+/// where n is the normal at the middle of the slave facet, and x_m the point where the ray along n from x_s meets the
 /// master (Puso and Laursen, Comput. Methods Appl. Mech. Eng. 193, 2004; Popp, Gee and Wall, Int. J. Numer. Methods
-/// Eng. 79, 2009, with gaps not divided by the area). The multiplier is the force of the node's share of the pressure,
-/// p ∫ N dA: [`area`](Self::area) has the integral. Facets that are covered in part count with what is covered, so that
-/// no row is small because little of it touches.
+/// Eng. 79, 2009, with gaps not divided by the area). The multiplier is the nodal force of the pressure, p ∫ N dA;
+/// [`area`](Self::area) returns the integral. Partly covered facets count with their covered part, so that rows do
+/// not become small where little touches.
 ///
-/// On facets of second order N is the linear shape function of their parts, so that weights are positive and each node
-/// has a row, and x_s and x_m follow the shape functions of second order (Puso, Laursen and Solberg, Comput. Methods
-/// Appl. Mech. Eng. 197, 2008): a constant pressure makes the nodal forces that their elements have of it. n is that of
-/// the part.
+/// On facets of second order N is the linear shape function of their parts, so that weights are positive and each
+/// node has a row. x_s and x_m follow the shape functions of second order (Puso, Laursen and Solberg, Comput. Methods
+/// Appl. Mech. Eng. 197, 2008), so that a constant pressure makes the same nodal forces as in their elements. n is
+/// the normal of the part.
 ///
-/// Rows of G are derivatives of the gap, from both surfaces, the turning of n and the stretch of the area. Contact
-/// forces conserve linear and angular momentum at the configuration where rows are linearized.
+/// Rows of G are derivatives of the gap with respect to both surfaces, including the rotation of n and the stretch of
+/// the area. Contact forces conserve linear and angular momentum at the configuration at which rows are linearized.
 ///
 /// # Which surface is the slave
 ///
-/// Pressure on flat surfaces is exact with either choice, whatever the meshes. Where a small surface slides over a
-/// large one the small one should be the slave, even if its facets are the larger ones: the contact moves with its
-/// nodes, and forces vary less (`docs/contact.md`, ironing). A search costs the intersection of all pairs of facets
-/// that are near each other.
+/// Pressure on flat surfaces is exact with either choice, for any meshes. Where a small surface slides over a large
+/// one the small one should be the slave, even if its facets are larger: the contact moves with its nodes, and forces
+/// vary less (`docs/contact.md`, ironing). The cost of a search is the intersection of all pairs of facets near each
+/// other.
 ///
 /// # Linearization
 ///
-/// As of [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, in between gaps are affine, and rows
-/// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are differences of gaps along the motion.
-/// What is close enough is found by boxes around the facets, as far as velocities take them. A node that slides over
-/// the rim of the master ends its step with the row it had; where surfaces have moved by more than a quarter of a facet
-/// since the search it is lost ([`Error::ContactLost`], which a smaller step mends). A step in which a facet has gone
-/// into or through the other surface by more than a tenth of its way, or half of the [reach](Self::reach), is refused
-/// ([`Error::PassedThrough`], which a smaller step mends). Geometry is computed in `f64` in every run.
+/// As for [`NodeToFacet`](super::NodeToFacet): candidates are found once a step, gaps are affine in between, and rows
+/// [`follow`](ContactConstraint::follow) the contact of the step. Their rates are differences of gaps along the
+/// motion. The search uses boxes around the facets, extended by the motion from the velocities. A node that slides
+/// over the rim of the master finishes its step with its last row. If the surfaces have moved by more than a quarter
+/// of a facet since the search, it is lost ([`Error::ContactLost`], and a smaller step helps). A step is rejected
+/// ([`Error::PassedThrough`], and a smaller step helps) if a surface has penetrated the other by more than a tenth of
+/// its path, or half of the [reach](Self::reach). Geometry is computed in `f64` in every run.
 ///
-/// Facets that are in each other by more than half of the material behind both, in the reference configuration, look
-/// toward each other through the bodies, and do not meet. So bodies beside each other may be thinner than the
-/// [reach](Self::reach) if their whole surfaces are given. [`BodyContact`](super::BodyContact) takes those of thin
-/// bodies, which have edges.
+/// Facets that penetrate each other by more than half of the material behind both, in the reference configuration,
+/// face each other through the bodies and are not in contact. So bodies may be thinner than the [reach](Self::reach)
+/// if their whole surfaces are given. As thin bodies have edges, use [`BodyContact`](super::BodyContact) for them.
 ///
 /// # Known failure
 ///
-/// - Facets at more than 60° to each other do not meet. A surface with convex corners or edges is therefore refused;
-///   [`BodyContact`](super::BodyContact) takes it, and has rows for corners and edges as well.
-/// - The rim of an open surface is no corner, for nothing is known of what lies behind it. A body given by one side may
-///   penetrate with its rim. It is then pushed out by 1e-4 of the smallest facet a step
+/// - There is no contact between facets at more than 60° to each other. So a surface with convex corners or edges is
+///   rejected; [`BodyContact`](super::BodyContact) accepts it, and has rows for corners and edges as well.
+/// - The rim of an open surface does not count as a corner, because the surface behind it is unknown. A body given by
+///   one side may penetrate with its rim. Then 1e-4 of the smallest facet is recovered per step
 ///   ([`Contact::recovery`](super::Contact::recovery)).
-/// - Of two layers of a master that lie behind each other within the reach both are met.
-/// - On facets of second order whose nodes are not in the middle, or that are curved, the pressure of the patch test is
-///   not exact to rounding (`docs/contact.md`): their areas are those of the parts.
-/// - Gaps are measured along the normals of facets, of second order along those of their parts.
+/// - If two layers of a master lie behind each other within the reach, the slave is in contact with both.
+/// - On facets of second order that are curved, or whose nodes are not in the middle, the pressure of the patch test
+///   is not exact to rounding (`docs/contact.md`), because areas are those of the linear parts.
+/// - Gaps are measured along the normals of facets; for facets of second order along the normals of their parts.
 ///
 /// # Identity
 ///
-/// (number of the slave node, 0); of [bonds](Self::bonded) (number of the slave node, axis), the normal being axis 0.
+/// (index of the slave node, 0); for [bonds](Self::bonded) (index of the slave node, axis), with the normal as axis
+/// 0.
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -125,31 +125,31 @@ pub struct Mortar<T: Real> {
     bonds: Option<Bonds<T>>,
     multiplier: Multiplier,
     pairs: Pairs,
-    /// The material behind the facets of both surfaces, once it was asked for.
+    /// The material behind the facets of both surfaces; none before it is needed.
     material: Option<[Material; 2]>,
     /// Positions at the last search, by body and place of the node there.
     searched_at: [Vec<Point>; 2],
     integrals: Integrals,
-    /// Of which positions, by how often nodes had moved, and by which factor of offsets (its bits) the integrals of the
-    /// pairs are, if any are known.
+    /// The state for which the integrals of the pairs are valid, if any: the number of changes of the positions, and
+    /// the factor of the offsets (its bits).
     known: Option<(usize, u64)>,
     rows: Rows<T>,
-    /// What the search under way finds.
+    /// Rows of the search in progress.
     found: Rows<T>,
-    /// What looking at a step needs.
+    /// Work space of `inspect`.
     look: passage::Look,
-    /// What rates need, and how far the last search looks ahead.
+    /// Work space of `rates`, and the time that the last search looks ahead.
     rates: rates::Rates,
     ahead: f64,
 }
 
 impl<T: Real> Mortar<T> {
-    /// Contact of the facets of a `slave` surface, whose nodes get the rows, with those of a `master`.
+    /// Contact of the facets of a `slave` surface, whose nodes get the rows, with the facets of a `master`.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
-    /// ([`Facet`]). The two surfaces share no node. The law is [`ContactLaw::Rigid`], unless
-    /// [`with_law`](Self::with_law) gives another.
+    /// dofs of their displacements. Facets list nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces must not share a node. The law is [`ContactLaw::Rigid`] by default, see
+    /// [`with_law`](Self::with_law).
     ///
     /// # Errors
     ///
@@ -178,7 +178,7 @@ impl<T: Real> Mortar<T> {
         Ok(contact)
     }
 
-    /// As [`new`](Self::new), for surfaces that may have corners and edges, to which other constraints give rows.
+    /// As [`new`](Self::new), for surfaces that may have corners and edges, whose rows are in other constraints.
     pub(crate) fn without_corner_check<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -209,26 +209,26 @@ impl<T: Real> Mortar<T> {
         })
     }
 
-    /// The law of all rows.
+    /// Sets the law of all rows.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0. Slip is the mean velocity of the slave against the points of
-    /// the master that it lies on, weighted as the gap is.
+    /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the mean velocity of the slave relative to the
+    /// opposite points of the master, weighted as the gap.
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;
         self
     }
 
-    /// Bonds the surfaces to each other where they lie upon each other in the reference configuration, within a tenth
-    /// of a facet: each slave node there has the rows of a [`Tie`](super::Tie), along the normal of the slave (outward,
-    /// in the mean over its area) and across it, until the traction in the mean over its area reaches the strength.
-    /// That is looked at after each step, with the forces that it reports; from the next one on the node is in contact
-    /// like any other. Nodes that touch later are not bonded.
+    /// Bonds the surfaces to each other where they touch in the reference configuration, within a tenth of a facet.
+    /// Each slave node there has the rows of a [`Tie`](super::Tie): along the slave's outward normal, averaged over
+    /// the node's area, and across it. The bond breaks when the traction, averaged over that area, reaches the
+    /// strength. This is checked after each step with its reported forces; from the next step on the node has
+    /// ordinary contact. Nodes that touch later are not bonded.
     ///
     /// ```
     /// use contact_dynamics::contact::{BondStrength, ContactConstraint, ContactLaw, Contacts, Mortar};
@@ -252,19 +252,19 @@ impl<T: Real> Mortar<T> {
     /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
     ///
-    /// Known failure: a crack runs by one node a step at most, and how far it runs from a notch depends on the mesh,
-    /// for a strength is no energy.
+    /// Known failure: a crack advances by at most one node per step. How far it runs from a notch depends on the
+    /// mesh, because a strength is not a fracture energy.
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). That nothing lies upon the
-    /// other surface is an error of the first search ([`Error::Empty`]).
+    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). If the surfaces do not touch
+    /// anywhere, the first search fails ([`Error::Empty`]).
     pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
         self.bonds = Some(Bonds::new(self.nodes.clone(), [self.slave.clone(), self.master.clone()], strength));
         self.with_fitting_bonds()
     }
 
-    /// Refuses bonds of surfaces with offsets, for what lies upon what is found for facets, and with dual functions.
+    /// Rejects bonds together with offsets, because touching parts are found for the facets, and with dual functions.
     fn with_fitting_bonds(self) -> Result<Self> {
         let (part, reason) = match (self.bonds.is_some(), self.multiplier) {
             (true, _) if !self.thickness.is_none() => (
@@ -280,11 +280,11 @@ impl<T: Real> Mortar<T> {
         Err(Error::Incompatible { part: part.into(), reason })
     }
 
-    /// How far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the thickness
-    /// of a shell whose facets are its middle surface, the thickness of a coating; negative if they lie inside. Between
-    /// nodes the shape functions interpolate. The gap is n·(x_m − x_s) less the offsets of both.
+    /// Sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the
+    /// thickness of a shell whose facets are its middle surface, the thickness of a coating; negative if they lie
+    /// inside. Between nodes the shape functions interpolate. The gap is n·(x_m − x_s) less the offsets of both.
     ///
-    /// Forces act on the facets: that a friction force acts at a distance from the middle surface is left out.
+    /// Forces act on the facets; the lever arm of a friction force about the middle surface is left out.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -303,7 +303,7 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless there is one a node of the mesh; [`Error::NotFinite`] (index: node);
+    /// [`Error::Dimension`] unless there is one offset per node of the mesh; [`Error::NotFinite`] (index: node);
     /// [`Error::Incompatible`] with [bonds](Self::bonded).
     pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
         self.thickness.set(offsets, self.nodes.coordinates.len())?;
@@ -313,17 +313,16 @@ impl<T: Real> Mortar<T> {
         self.with_fitting_bonds()
     }
 
-    /// Lets all [`offsets`](Self::offsets) grow, or shrink, with time: by the factor `factors[0]` until `times[0]`, by
-    /// `factors[1]` from `times[1]` on, and in between smoothly, without a jump of velocity or acceleration (a
-    /// polynomial of the fifth degree).
+    /// Scales all [`offsets`](Self::offsets) in time: by the factor `factors[0]` until `times[0]`, by `factors[1]`
+    /// from `times[1]` on. In between the factor is smooth, without a jump of velocity or acceleration (a polynomial
+    /// of the fifth degree).
     ///
-    /// A press fit whose bodies are meshed as they are before, one overlapping the other by d, begins with offsets
-    /// whose sum is −d and factors from 1 to 0; one whose bodies are meshed as if they just fitted ends with a sum of
-    /// d, by factors from 0 to 1.
+    /// For a press fit whose meshes overlap by d, start with offsets whose sum is −d, and factors from 1 to 0. If the
+    /// meshes just fit, use a sum of d and factors from 0 to 1.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless all are finite and the second time is later.
+    /// [`Error::Parameter`] unless all values are finite and the second time is later.
     pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
         self.thickness.ramp = Ramp::new(times, factors)?;
         self.material = None;
@@ -331,28 +330,28 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// Weights gaps with dual functions of the multiplier instead of the shape functions N: on each slave facet
+    /// Weights gaps with dual functions of the multiplier instead of the shape functions N. On each slave facet
     ///
     /// ψ_a = Σ_b A_ab N_b, A = D M⁻¹, D = diag ∫ N_a dA, M_ab = ∫ N_a N_b dA, so that ∫ ψ_a N_b dA = δ_ab ∫ N_a dA
     ///
-    /// (Wohlmuth, SIAM J. Numer. Anal. 38, 2000; Popp, Gee and Wall, Int. J. Numer. Methods Eng. 79, 2009). Of a flat
-    /// slave surface that touches the master and is covered, a row then has its own node only, so that G M⁻¹ Gᵀ has
-    /// fewer entries, and slip is that of this node. Where surfaces are apart or curved the row has a little of the
-    /// others, from the turning of normals. A is that of segments, triangles and parallelograms, which is one for all
-    /// shapes: on other quadrilaterals, and on facets of second order, whose parts have ψ, rows have a little of the
-    /// others as well.
+    /// (Wohlmuth, SIAM J. Numer. Anal. 38, 2000; Popp, Gee and Wall, Int. J. Numer. Methods Eng. 79, 2009). On a
+    /// flat, fully covered slave surface that touches the master, a row then acts on no slave node but its own, so
+    /// that G M⁻¹ Gᵀ has fewer entries, and slip is the slip of this node. Where surfaces are apart or curved, the
+    /// rotation of normals adds small entries of the others. A has the value for segments, triangles and
+    /// parallelograms, which does not depend on their shape. On other quadrilaterals, and on facets of second order,
+    /// whose linear parts have ψ, rows have small entries of the others as well.
     ///
-    /// ψ is negative far from its node. On a facet that is covered in part the weights are (1 − c) N + c ψ, with c a
-    /// smooth function of the covered share of its area: 0 up to three quarters, 1 for all of it. So on segments,
-    /// triangles and parallelograms the integral of a weight is positive whatever the part, a third of that of N at
-    /// least. What c changes by is in the rows. Weights add up to one everywhere: a constant pressure is exact as with
-    /// N, and momenta are conserved.
+    /// ψ is negative far from its node. On a partly covered facet the weights are (1 − c) N + c ψ, with c a smooth
+    /// function of the covered share of its area: 0 up to three quarters, 1 at full cover. So on segments, triangles
+    /// and parallelograms the integral of a weight is positive for any covered part, at least a third of the integral
+    /// of N. Rows include the change of c. Weights sum to one everywhere: a constant pressure is exact as with N, and
+    /// momenta are conserved.
     ///
-    /// Known failure: distances far from the node count with a negative weight, so that over rough or curved masters a
-    /// gap may be above or below all the distances that it is the mean of: negative where surfaces are apart. A start
-    /// nearly in contact may be refused for that ([`Error::InitialViolation`]); let
-    /// [`InitialOverclosure::RemovedOver`](crate::InitialOverclosure::RemovedOver) take such gaps off, or let the
-    /// surface with the larger radius of curvature be the master.
+    /// Known failure: distances far from the node have a negative weight. So over rough or curved masters a gap may
+    /// be outside the range of the distances that it averages, and negative where surfaces are apart. Then a start
+    /// nearly in contact may be rejected ([`Error::InitialViolation`]): use
+    /// [`InitialOverclosure::RemovedOver`](crate::InitialOverclosure::RemovedOver), or make the surface with the
+    /// larger radius of curvature the master.
     ///
     /// ```
     /// use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};
@@ -376,15 +375,15 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [bonds](Self::bonded), whose rows have N.
+    /// [`Error::Incompatible`] with [bonds](Self::bonded), whose rows are weighted with N.
     pub fn dual(mut self) -> Result<Self> {
         self.multiplier = Multiplier::Dual;
         self.known = None;
         self.with_fitting_bonds()
     }
 
-    /// How far (length) outside of each other, and inside, facets meet at least; by default the mean size of the
-    /// facets, of the coarser surface. What the velocities bring near within a step is found as well.
+    /// Sets the least distance (length), outside and inside, at which facets are found; by default the mean size of
+    /// the facets, of the coarser surface. The motion within a step is added by the velocities.
     ///
     /// # Errors
     ///
@@ -395,8 +394,8 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// How far (length) the surfaces may move relative to each other before lists of pairs are built anew; if not
-    /// given, half of what is searched. It changes the cost, not the result.
+    /// Sets how far (length) the surfaces may move relative to each other before lists of pairs are rebuilt; the
+    /// default is half of the search range. It changes the cost, not the result.
     ///
     /// # Errors
     ///
@@ -406,8 +405,8 @@ impl<T: Real> Mortar<T> {
         Ok(self)
     }
 
-    /// ∫ N dA (area; length in two dimensions) over what is covered of the facets around the node of a row, N being its
-    /// weights, [dual](Self::dual) or not: its force over this is the pressure.
+    /// ∫ N dA (area; length in two dimensions) over the covered part of the facets around the node of a row, with its
+    /// weights N, [dual](Self::dual) or not. The force of the row divided by it is the pressure.
     pub fn area(&self, row: usize) -> T {
         T::of(self.rows.spots[row].area)
     }
@@ -422,7 +421,7 @@ impl<T: Real> Mortar<T> {
         self.slave.finest().min(self.master.finest())
     }
 
-    /// How far the surfaces have moved against each other since the last search.
+    /// A bound of the relative motion of the surfaces since the last search.
     fn moved_since_search(&self) -> f64 {
         let [one, other] = [0, 1].map(|body| {
             let moved = |(&node, &before): (&usize, &Point)| sub(self.nodes.positions[node], before);
@@ -431,17 +430,17 @@ impl<T: Real> Mortar<T> {
         one.farthest(&other)
     }
 
-    /// Bounds of the sum of the offsets of both surfaces at t, below and above zero.
+    /// Lower bound (≤ 0) and upper bound (≥ 0) of the sum of the offsets of both surfaces at t.
     fn thickest(&self, t: f64) -> [f64; 2] {
         self.thickness.bounds(self.nodes.bodies(), self.thickness.ramp.at(t))
     }
 
-    /// How deep surfaces may be in each other at t and be found.
+    /// The largest penetration at t at which surfaces are found.
     fn depth(&self, t: f64) -> f64 {
         self.reach.least() - self.thickest(t)[0]
     }
 
-    /// Finds the material behind facets, if that was not done before.
+    /// Finds the material behind facets, unless it is known.
     fn find_material(&mut self) {
         if self.material.is_none() {
             let known = (self.reach.least(), self.thickness.overlap(self.nodes.bodies()));
@@ -450,7 +449,7 @@ impl<T: Real> Mortar<T> {
         }
     }
 
-    /// Pairs of facets within `range`, of those that the surfaces make now, at t.
+    /// Finds the pairs of facets within `range` at the current positions, at t.
     fn find_pairs(&mut self, t: f64, range: f64) {
         let depth = self.depth(t);
         self.find_material();
@@ -466,8 +465,8 @@ impl<T: Real> Mortar<T> {
         }
     }
 
-    /// Integrates where the nodes are now, unless that is where integrals are from: a step begins where the rows of the
-    /// last one were made, as a rule.
+    /// Integrates at the current positions, unless the integrals are known there: usually a step begins where the
+    /// rows of the last one were linearized.
     fn integrate(&mut self, t: f64) {
         let present = Some((self.nodes.moves(), self.thickness.ramp.at(t).to_bits()));
         if self.known == present {
@@ -541,14 +540,14 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             Some(bonds) => bonds.tie_mut().follow(t, u)?,
             None => Candidates::Unchanged,
         };
-        // A trial state that is not finite: the gaps say so.
+        // If a trial state is not finite, the gaps are not finite either.
         if self.rows.places.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(tied);
         }
         self.integrate(t);
         self.found.clear();
         let count = self.tangents();
-        // (Asked only where a row has lost its surroundings.)
+        // Evaluated only if a row is uncovered.
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
         let near = self.rows.places.iter().all(is_covered) || self.moved_since_search() <= BEYOND * self.finest();
         let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
@@ -557,7 +556,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             if found.push(place, integrals, &made) {
                 continue;
             }
-            // Nothing lies over it any more. What is open stays so, and what has just gone over the rim ends its step.
+            // The row is no longer covered. An open row stays open, and a node just beyond the rim finishes its step.
             let spot = &rows.spots[row];
             let gap = rows.affine.gap(row, u).value() - (made.factor - spot.factor) * spot.offset;
             if !near && gap <= OPEN * reach.least() {

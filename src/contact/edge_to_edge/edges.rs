@@ -1,4 +1,4 @@
-//! The edges of a surface: convex sides between facets that turn, and the normals that a body has there.
+//! The edges of a surface: convex sides between facets that turn, and the normals of the body there.
 
 use crate::contact::surface::{Bounds, Facet, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
 
@@ -9,12 +9,12 @@ pub(super) struct Edge {
     pub(super) nodes: [usize; 2],
     /// Its length in the reference coordinates.
     pub(super) length: f64,
-    /// The facet that has them in this order, and which of its sides that is; then the facet that has them in the
-    /// other.
+    /// The facet that has the nodes in this order, and the index of its side; then the facet that has them in reverse
+    /// order.
     sides: [(usize, usize); 2],
 }
 
-/// The edge with its facets where their nodes are.
+/// The direction of an edge and the normals of its facets, at given positions of the nodes.
 struct Wedge {
     along: Point,
     normals: [Point; 2],
@@ -27,8 +27,8 @@ impl Wedge {
         dot(self.along, cross(left, right)).atan2(dot(left, right))
     }
 
-    /// Sine of the angle by which a normal across the edge lies outside of those that the body has there, between those
-    /// of its facets; 1 for one that looks the other way, and where the edge is not convex.
+    /// Sine of the angle by which a normal across the edge lies outside the range of normals between the two facets;
+    /// 1 if it points the other way, or if the edge is not convex.
     fn miss(&self, normal: Point) -> f64 {
         let [left, right] = self.normals;
         if dot(self.along, cross(left, right)) <= 0.0 || dot(normal, left) + dot(normal, right) <= 0.0 {
@@ -38,7 +38,7 @@ impl Wedge {
         beyond[0].max(beyond[1]).max(0.0)
     }
 
-    /// Whether the opposite of a normal leads into the body.
+    /// Whether the reversed normal points into the body.
     fn holds_behind(&self, normal: Point, margin: f64) -> bool {
         self.normals.iter().all(|side| dot(normal, *side) >= -margin)
     }
@@ -64,22 +64,22 @@ impl Edge {
         edges
     }
 
-    /// The two facets beside it.
+    /// The two adjacent facets.
     pub(super) fn facets(&self) -> [usize; 2] {
         self.sides.map(|(facet, _)| facet)
     }
 
-    /// Nodes of the two facets beside it.
+    /// Nodes of the two adjacent facets.
     pub(super) fn around<'a>(&self, surface: &'a Surface) -> impl Iterator<Item = usize> + use<'a> {
         self.sides.into_iter().flat_map(|(facet, _)| surface.facets()[facet].nodes().iter().copied())
     }
 
-    /// Its ends where nodes are.
+    /// Its ends, with the nodes at these positions.
     pub(super) fn ends(&self, at: &impl Fn(usize) -> Point) -> [Point; 2] {
         self.nodes.map(at)
     }
 
-    /// Its box where nodes are.
+    /// Its box, with the nodes at these positions.
     pub(super) fn bounds(&self, positions: &[Point]) -> Bounds {
         Bounds::of_points(self.nodes.map(|node| positions[node]))
     }
@@ -98,18 +98,18 @@ impl Edge {
         })
     }
 
-    /// Sine of the angle by which a normal lies outside of those of the body at a share of the edge.
+    /// Sine of the angle by which a normal lies outside the normals of the body at a share of the edge.
     pub(super) fn miss(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> f64 {
         self.wedge(share, surface, at).map_or(1.0, |wedge| wedge.miss(normal))
     }
 
-    /// Whether the way back from a share of the edge along a normal leads into the body.
+    /// Whether the reversed normal points into the body at a share of the edge.
     pub(super) fn is_behind(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> bool {
         const ROUNDING: f64 = 1e-9;
         self.wedge(share, surface, at).is_some_and(|wedge| wedge.holds_behind(normal, ROUNDING))
     }
 
-    /// A point of it, if its ends are at those places.
+    /// The point at a share of the edge between these ends.
     pub(super) fn point([from, to]: [Point; 2], share: f64) -> Point {
         add_scaled(from, share, sub(to, from))
     }

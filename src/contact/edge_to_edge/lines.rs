@@ -1,25 +1,25 @@
-//! Two straight edges: where the lines through them are closest, how far apart, and when moving ones meet.
+//! Two straight edges: the closest points of the lines through them, their distance, and when moving ones meet.
 
 use crate::contact::surface::{Point, add_scaled, cross, dot, norm, sub};
 
 /// The two ends of an edge, or their velocities.
 pub(super) type Ends = [Point; 2];
 
-/// Where the lines through two edges are closest.
+/// The closest points of the lines through two edges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crossing {
     /// Shares along the edges, from 0 to 1 within them.
     pub(super) shares: [f64; 2],
     /// The unit vector along t_e × t_f.
     pub(super) normal: Point,
-    /// The distance of the first line from the second along it, with its sign.
+    /// The signed distance of the first line from the second along the normal.
     pub(super) gap: f64,
     /// Sine of the angle between the edges.
     pub(super) sine: f64,
 }
 
 impl Crossing {
-    /// The closest points of two lines; none if one has no length, or if they are parallel to rounding.
+    /// The closest points of two lines; none if one has no length, or if they are parallel up to rounding.
     pub(super) fn of([e, f]: [Ends; 2]) -> Option<Self> {
         const ROUNDING: f64 = 1e-12;
         let (along, other) = (sub(e[1], e[0]), sub(f[1], f[0]));
@@ -34,28 +34,28 @@ impl Crossing {
         Some(Self { shares, normal, gap: dot(normal, between), sine })
     }
 
-    /// Seen from the other side: the normal turned, the sign of the gap with it.
+    /// With the reversed normal and gap.
     pub(super) fn turned(self) -> Self {
         Self { normal: self.normal.map(|x| -x), gap: -self.gap, ..self }
     }
 
-    /// The side from which it is seen along a direction.
+    /// Oriented so that the normal points along a direction.
     pub(super) fn as_seen_along(self, direction: Point) -> Self {
         if dot(self.normal, direction) < 0.0 { self.turned() } else { self }
     }
 
-    /// How far, in shares of them, beyond the ends of the two edges the closest points lie; zero within.
+    /// How far the closest points lie beyond the ends of the two edges, in shares of the edges; zero within.
     pub(super) fn excess(&self) -> [f64; 2] {
         self.shares.map(|share| (-share).max(share - 1.0).max(0.0))
     }
 
-    /// Shape functions of the four ends in the motion of the first point against the second.
+    /// Shape functions of the four ends in the motion of the first point relative to the second.
     pub(super) fn weights(&self) -> [f64; 4] {
         let [s, t] = self.shares;
         [1.0 - s, s, t - 1.0, -t]
     }
 
-    /// The derivatives of one of the shares by the positions of the four ends.
+    /// The derivatives of one of the shares with respect to the positions of the four ends.
     ///
     /// With r = x_e − x_f = g n and w = δx_e − δx_f at fixed shares, r·d = r·c = 0 along both edges d and c give
     /// d·d δs − c·d δt = −(w·d + r·δd) and d·c δs − c·c δt = −(w·c + r·δc).
@@ -75,13 +75,13 @@ impl Crossing {
     /// d²g/dτ² of two edges whose ends move in straight lines, at velocities `v`.
     ///
     /// With N = t_e × t_f and r from any point of the second line to any point of the first that move with the edges,
-    /// g = r·N/|N|. The closest points are taken, where r = g n: nothing is lost in differences of long vectors.
+    /// g = r·N/|N|. With the closest points, r = g n avoids differences of long vectors.
     pub(super) fn acceleration(&self, [e, f]: [Ends; 2], [v, w]: [Ends; 2]) -> f64 {
         let ([along, other], [turn, twist]) = ([e, f].map(|x| sub(x[1], x[0])), [v, w].map(|x| sub(x[1], x[0])));
         let point = |ends: Ends, share: f64, turn: Point| add_scaled(ends[0], share, turn);
         let speed = sub(point(v, self.shares[0], turn), point(w, self.shares[1], twist));
         let (apart, across) = (self.normal.map(|x| self.gap * x), cross(along, other));
-        // (Either sign of N belongs to the same lines; g has that of the normal.)
+        // g has the sign of the normal, which may be opposite to N.
         let sign = if dot(self.normal, across) < 0.0 { -1.0 } else { 1.0 };
         let first = add_scaled(cross(turn, other), 1.0, cross(along, twist));
         let second = cross(turn, twist).map(|x| 2.0 * x);
@@ -105,7 +105,7 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    /// From some positions of their ends by some ways.
+    /// From these positions of the ends and their displacements.
     pub(super) fn new(from: [Ends; 2], by: [Ends; 2]) -> Self {
         Self { from, by }
     }
@@ -115,12 +115,12 @@ impl Ways {
         [0, 1].map(|k| [0, 1].map(|end| add_scaled(self.from[k][end], share, self.by[k][end])))
     }
 
-    /// The times within (0, 1], ascending, at which the lines meet: roots of (x_e − x_f)·(t_e × t_f), a cubic in τ.
-    /// (Bridson, Fedkiw and Anderson, ACM Trans. Graph. 21, 2002.)
+    /// The times within (0, 1], ascending, at which the lines meet: roots of (x_e − x_f)·(t_e × t_f), a cubic in τ
+    /// (Bridson, Fedkiw and Anderson, ACM Trans. Graph. 21, 2002).
     pub(super) fn meetings(&self) -> impl Iterator<Item = f64> + use<> {
         let cubic = self.cubic();
         let value = move |x: f64| cubic[0] + x * (cubic[1] + x * (cubic[2] + x * cubic[3]));
-        // Between the roots of the derivative it is monotone.
+        // It is monotone between the roots of the derivative.
         let (a, b, c) = (3.0 * cubic[3], 2.0 * cubic[2], cubic[1]);
         let discriminant = b * b - 4.0 * a * c;
         let q = -0.5 * (b + discriminant.max(0.0).sqrt().copysign(b));

@@ -1,34 +1,34 @@
-//! Two edges and the bodies behind them: whether they meet, whether they may come to within a step, and their gap.
+//! Pairs of edges and the bodies behind them: whether they meet, or may meet within a step, and their gap.
 
 use super::edges::Edge;
 use super::lines::{Crossing, Ways};
 use crate::contact::surface::{Bounds, Offsets, Point, RECOVERY, Surface, add_scaled, dot, sub};
 
-/// Sine of the smallest angle between two edges that have a row. Nodes on facets cannot keep edges apart that cross
-/// between nodes at an angle φ, but let them in by half an edge times sin φ at most: here by 2.5 % of an edge. And
-/// normals of edges that are parallel but for φ turn 1/sin φ times as fast as the edges.
+/// Sine of the smallest angle between two edges with a row. If edges cross between nodes at an angle φ, nodes on
+/// facets let them penetrate by at most half an edge times sin φ: here by 2.5 % of an edge. The normal of two edges
+/// at an angle φ turns 1/sin φ times as fast as the edges.
 pub(super) const LEAST_SINE: f64 = 0.05;
 
-/// Shares of an edge, and sines, that are rounding.
+/// Shares of an edge, and sines, below which a value is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Depth in shares of the shorter edge up to which a pair is kept whatever the shape of the bodies behind.
+/// Depth, as a share of the shorter edge, up to which a pair is kept for any shape of the bodies behind.
 const SHALLOW: f64 = 1e-3;
 
-/// Shares of an edge, of the gap and beyond the ends, within which edges touch: beside a dent, where the normal may be
-/// none of the facets there, they are in contact all the same.
+/// Gap and distance beyond the ends, as shares of an edge, within which edges touch. Beside a dent they are in
+/// contact then even if the normal lies outside the normals of the facets.
 const TOUCH: f64 = 0.02;
 
-/// How steeply the gap opens beyond the end of an edge, and the share of the edge in which it comes to.
+/// The slope of the gap beyond the end of an edge, and the share of the edge over which it grows to that slope.
 const STEEP: f64 = 2.0;
 const WIDTH: f64 = 0.1;
 
-/// Depth in shares of the shorter edge, beside the way of a step, beyond which two lines are far sides of bodies, not
-/// edges that have crossed.
+/// Depth, as a share of the shorter edge and beyond the motion of a step, beyond which two lines are far sides of the
+/// bodies and not edges that have crossed.
 const DEEPEST: f64 = 0.25;
 
-/// What a step may change beside the way of its velocities, in shares of an edge; the sine by which normals may turn
-/// within it at most.
+/// Motion within a step in addition to the velocities, as a share of an edge; and the largest sine by which normals
+/// turn within a step.
 const UNFORESEEN: f64 = 0.1;
 const LARGEST_TURN: f64 = 0.5;
 
@@ -37,9 +37,9 @@ const LARGEST_TURN: f64 = 0.5;
 pub(super) struct Pair<'a> {
     pub(super) edges: [&'a Edge; 2],
     pub(super) surfaces: [&'a Surface; 2],
-    /// By how much the edges are rounded.
+    /// The radii of the edges.
     pub(super) offsets: Offsets<'a>,
-    /// How deep the edges may lie in each other and be in contact.
+    /// The largest penetration of the edges in contact.
     pub(super) depth: f64,
 }
 
@@ -54,7 +54,7 @@ impl Pair<'_> {
         self.edges.map(|edge| edge.ends(at))
     }
 
-    /// A bound of the motion of the edges against each other, by a vector a node.
+    /// A bound of the relative motion of the edges, by a vector per node.
     pub(super) fn way(&self, vector: &impl Fn(usize) -> Point) -> f64 {
         let [one, other] = self.edges.map(|edge| Bounds::of_points(edge.ends(vector)));
         one.farthest(&other)
@@ -65,7 +65,7 @@ impl Pair<'_> {
         self.edges.map(|edge| edge.nodes.map(|node| self.offsets.of(node)))
     }
 
-    /// The sum of the radii of both edges where they are closest, without its factor.
+    /// The sum of the radii of both edges at their closest points, without its factor.
     pub(super) fn radius(&self, crossing: &Crossing) -> f64 {
         let between = |([from, to], share): ([f64; 2], f64)| from + share * (to - from);
         self.radii().into_iter().zip(crossing.shares).map(between).sum()
@@ -80,15 +80,16 @@ impl Pair<'_> {
         self.edges[0].length.min(self.edges[1].length)
     }
 
-    /// Sine of the angle by which the normal, turned, is none of the first body, or as it is none of the second.
+    /// Sine of the angle by which the normal lies outside the normals of the second body, or the reversed normal
+    /// outside the normals of the first; the larger one.
     fn misses_normal(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
         let ([first, second], [s, t]) = (self.edges, crossing.shares);
         let turned = first.miss(crossing.normal.map(|x| -x), s, self.surfaces[0], at);
         turned.max(second.miss(crossing.normal, t, self.surfaces[1], at))
     }
 
-    /// By how much edges miss each other at their closest points, zero if they meet there: shares of the edges beyond
-    /// their ends, and that sine.
+    /// By how much edges miss each other at their closest points: that sine, or the share of an edge beyond its ends.
+    /// Zero if they meet.
     fn miss(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> f64 {
         crossing.excess().into_iter().fold(self.misses_normal(crossing, at), f64::max)
     }
@@ -101,24 +102,24 @@ impl Pair<'_> {
             && first.is_behind(back, crossing.shares[0], self.surfaces[0], at)
     }
 
-    /// Whether edges that press on each other are where they may.
+    /// Whether two closed edges still meet, within a tolerance.
     pub(super) fn is_about(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> bool {
         self.miss(crossing, at) <= LARGEST_TURN + UNFORESEEN
     }
 
-    /// Where the edges meet, seen so that the gap is positive outside.
+    /// The closest points of edges that meet, oriented so that the gap is positive outside.
     pub(super) fn meeting(&self, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
         let crossing = Crossing::of(self.ends(at)).filter(|crossing| crossing.sine >= LEAST_SINE)?;
         [crossing, crossing.turned()].into_iter().find(|crossing| self.miss(crossing, at) <= ROUNDING)
     }
 
-    /// The lines through edges that meet within a distance of `reach` and the way, or that may come to meet within a
-    /// step in which they move against each other by a way of about this length.
+    /// The closest points of edges that meet within a distance of `reach` plus `way`, or that may meet within a step
+    /// with a relative motion of about the length `way`.
     pub(super) fn near(&self, reach: f64, way: f64, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
         let crossing = Crossing::of(self.ends(at)).filter(|crossing| {
             let rounded = (self.offsets.factor * self.radius(crossing)).abs();
             let mut excess = crossing.excess().into_iter().zip(self.edges);
-            // Where lines meet at an angle φ their closest points move 1/sin φ times as fast as they do.
+            // If lines meet at an angle φ, their closest points move 1/sin φ times as fast as the lines.
             crossing.sine >= LEAST_SINE
                 && crossing.gap.abs() <= reach + rounded + way
                 && excess.all(|(x, edge)| x * edge.length <= UNFORESEEN * edge.length + 2.0 * way / crossing.sine)
@@ -129,8 +130,8 @@ impl Pair<'_> {
         let is_near = |crossing: &Crossing| {
             let (misses, gap) = (self.misses_normal(crossing, at), self.clear(crossing));
             let touches = gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
-            // What is in already must be in the bodies, and meet; what comes must come from outside. (Beyond an end
-            // what presses has lines in each other by the opening of its gap, and no more.)
+            // Edges that already penetrate must lie in the bodies, and meet; others must approach from outside.
+            // Beyond an end the lines of closed edges penetrate by at most the opening of the gap.
             let on_edges = crossing.excess().into_iter().all(|x| x <= ROUNDING);
             let meets = || on_edges || gap + self.by_shares(crossing).0 >= -SHALLOW * shorter;
             let inside = || misses <= ROUNDING && gap >= -deepest && meets() && self.is_inside(crossing, at);
@@ -140,13 +141,13 @@ impl Pair<'_> {
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
 
-    /// How far edges that are in each other come out in a step.
+    /// Largest penetration that is recovered in a step.
     pub(super) fn recovery(&self) -> f64 {
         RECOVERY * self.shorter()
     }
 
-    /// The edge beyond whose end the closest points lie, if any, and the opening of the gap for it with its derivatives
-    /// by the share of that edge: a x²/(x + w) in lengths of the edge, x being what they are beyond.
+    /// The edge beyond whose end the closest points lie, if any, and the opening of the gap with its derivatives by
+    /// the share of that edge: a x²/(x + w) in lengths of the edge, at the share x beyond the end.
     fn opening(&self, crossing: &Crossing) -> Option<(usize, [f64; 3])> {
         let excess = crossing.excess();
         let [one, other] = [0, 1].map(|edge| excess[edge] * self.edges[edge].length);
@@ -158,8 +159,9 @@ impl Pair<'_> {
         (x > 0.0).then(|| (edge, [value[0], value[1] / (x + w).powi(2), value[2] / (x + w).powi(3)]))
     }
 
-    /// The gap of the edges, and its derivatives by the positions of the four ends: those of the lines where closest
-    /// points are on the edges. Beyond an end the gap opens, slowly at first, so that both are continuous.
+    /// The gap of the edges, and its derivatives with respect to the positions of the four ends: those of the lines
+    /// if the closest points are on the edges. Beyond an end the gap opens, slowly at first, so that both are
+    /// continuous.
     pub(super) fn row(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> (f64, [Point; 4]) {
         let mut row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
         let (opening, slopes) = self.by_shares(crossing);
@@ -170,8 +172,8 @@ impl Pair<'_> {
         (self.clear(crossing) + opening, row)
     }
 
-    /// The opening of the gap beyond an end, and what the gap changes by with the shares along either edge, from that
-    /// and from their radii.
+    /// The opening of the gap beyond an end, and the derivatives of the gap with respect to the shares along both
+    /// edges, from the opening and from the radii.
     fn by_shares(&self, crossing: &Crossing) -> (f64, [f64; 2]) {
         let mut slopes = self.radii().map(|[from, to]| -self.offsets.factor * (to - from));
         let Some((edge, [opening, slope, _])) = self.opening(crossing) else { return (0.0, slopes) };
@@ -179,7 +181,7 @@ impl Pair<'_> {
         (opening, slopes)
     }
 
-    /// The rate of the sum of the radii, in full size, along straight ways at some velocities.
+    /// The rate of the sum of the radii, at full size, for straight motions at these velocities.
     pub(super) fn sliding(
         &self,
         crossing: &Crossing,
@@ -194,7 +196,7 @@ impl Pair<'_> {
         self.radii().into_iter().enumerate().map(|(edge, radii)| of_edge(edge, radii)).sum()
     }
 
-    /// d²g/dτ² of that gap along straight ways at some velocities. (Shares from differences.)
+    /// d²g/dτ² of that gap for straight motions at these velocities, with differences of the shares.
     pub(super) fn acceleration(
         &self,
         crossing: &Crossing,
@@ -224,7 +226,7 @@ impl Pair<'_> {
     }
 }
 
-/// The vector by which the points at shares of two edges move against each other, by those of their ends.
+/// The relative motion of the points at shares of two edges, from the motions of their ends.
 pub(super) fn motion([e, f]: [[Point; 2]; 2], [s, t]: [f64; 2]) -> Point {
     sub(Edge::point(e, s), Edge::point(f, t))
 }

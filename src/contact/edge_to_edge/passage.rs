@@ -1,4 +1,4 @@
-//! What edges have gone through in a step: their straight ways against each other.
+//! Checks whether edges have passed through each other in a step, by their straight paths.
 
 use super::EdgeToEdge;
 use super::lines::{Crossing, Ways};
@@ -8,17 +8,17 @@ use crate::contact::{LARGEST_MISS, Stride, press_differently};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Share of the smallest edge that edges may move against each other without being looked at.
+/// Relative motion, as a share of the smallest edge, up to which edges are not checked.
 const FINE: f64 = 0.125;
 
-/// The same above which the normal is looked at along which they were stopped.
+/// The same limit for the check of the normal along which edges were stopped.
 const COARSE: f64 = 0.6;
 
-/// Looks at how deep an edge is between going in and coming out.
+/// Number of depths that are checked between two meetings of the lines.
 const LOOKS: u32 = 4;
 
 impl<T: Real> EdgeToEdge<T> {
-    /// Refuses a step in which two edges have gone through each other, or were stopped apart.
+    /// Rejects a step in which two edges went through each other, or were stopped apart.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
         let longest = motions[0].farthest(&motions[1]);
@@ -43,7 +43,7 @@ impl<T: Real> EdgeToEdge<T> {
         }
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
         let others = swept(&self.nodes.bodies()[1]);
-        // Lists know what an edge may meet, unless it was faster than its velocity promised.
+        // Lists are complete unless the edges were faster than their velocities at the search.
         let listed = longest <= self.vicinity.reach.listed();
         for (first, edge) in self.edges[0].iter().enumerate() {
             let bounds = swept(&edge.nodes);
@@ -54,7 +54,7 @@ impl<T: Real> EdgeToEdge<T> {
             for k in 0..list.map_or(self.edges[1].len(), <[usize]>::len) {
                 let index = [first, list.map_or(k, |list| list[k])];
                 let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
-                // What a spring stops goes in.
+                // Edges stopped by a spring penetrate.
                 let springs = self.law.is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
                 if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
                     continue;
@@ -67,7 +67,7 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(())
     }
 
-    /// Says what is wrong with where a row has stopped its edges.
+    /// Checks the position and normal at which a row has stopped its edges; returns the reason for a rejection.
     fn look_at_row(
         &self,
         row: usize,
@@ -94,7 +94,7 @@ impl<T: Real> EdgeToEdge<T> {
         if !pair.is_about(&to, end) {
             return Err(("was stopped where the edges do not meet", way, gap));
         }
-        // (What was deep inside stays so: see `recovery`.)
+        // A deep penetration is kept, see `recovery`.
         let kept = self.law.kept_depth(gap, pair_before.recovery());
         if (pair.clear(&to) + kept).abs() > LARGEST_MISS * way {
             return Err(("was stopped away from the other edge", way, gap));
@@ -107,7 +107,7 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(())
     }
 
-    /// Says whether the edges have gone into each other on their ways, and how deep.
+    /// Checks whether the edges have penetrated each other along their paths; returns the reason for a rejection.
     fn look_at_way(
         &self,
         pair: &Pair<'_>,

@@ -1,17 +1,17 @@
-//! The rows of edges on edges: entries of G, where the edges are closest, and the gaps there.
+//! The rows of edges on edges: entries of G, closest points of the edges, and gaps there.
 
 use super::lines::Crossing;
 use crate::contact::affine_rows::AffineRows;
 use crate::contact::surface::Point;
 use crate::real::Real;
 
-/// The rows that a search found, where they are linearized.
+/// The rows of a search, at their point of linearization.
 #[derive(Debug)]
 pub(super) struct Rows<T> {
     pub(super) affine: AffineRows<T>,
     /// The edges of the two surfaces.
     pub(super) pairs: Vec<[usize; 2]>,
-    /// The sum of their radii in full size, and the factor that the gap was made with.
+    /// The sum of their radii at full size, and its factor in the gap.
     pub(super) rounding: Vec<(f64, f64)>,
     /// The lines through them, with the normal along which the first edge opens.
     pub(super) crossings: Vec<Crossing>,
@@ -29,7 +29,7 @@ impl<T: Real> Rows<T> {
         self.crossings.clear();
     }
 
-    /// Appends the row of two edges: their four nodes, the gap and its derivatives by the positions of these.
+    /// Appends the row of two edges: their four nodes, and the gap with its derivatives by the positions of these.
     pub(super) fn push<'a>(
         &mut self,
         (pair, crossing): ([usize; 2], Crossing),
@@ -45,7 +45,7 @@ impl<T: Real> Rows<T> {
         self.crossings.push(crossing);
     }
 
-    /// Appends a row as another list has it.
+    /// Appends a copy of a row of another list.
     pub(super) fn keep(&mut self, other: &Self, row: usize) {
         self.affine.keep(&other.affine, row);
         self.pairs.push(other.pairs[row]);

@@ -5,14 +5,14 @@ use crate::contact::{BondStrength, Candidates, ContactConstraint, Tie};
 use crate::error::Result;
 use crate::real::Real;
 
-/// The ties of the nodes that hold, and what they bear.
+/// The ties of the bonded nodes, and their strength.
 #[derive(Debug)]
 pub(super) struct Bonds<T: Real> {
     tie: Tie<T>,
     strength: BondStrength,
     /// For each node of the slave surface, by place, whether it is bonded.
     holds: Vec<bool>,
-    /// Whether that has changed since the last search.
+    /// Whether `holds` has changed since the last search.
     changed: bool,
 }
 
@@ -31,7 +31,7 @@ impl<T: Real> Bonds<T> {
         self.holds[place]
     }
 
-    /// The ties of the nodes that hold.
+    /// The ties of the bonded nodes.
     pub(super) fn tie(&self) -> &Tie<T> {
         &self.tie
     }
@@ -40,7 +40,7 @@ impl<T: Real> Bonds<T> {
         &mut self.tie
     }
 
-    /// Is told which nodes of the slave (ascending) are broken.
+    /// Sets the broken nodes of the slave (ascending).
     pub(super) fn set_broken(&mut self, slave: &Surface, broken: &[usize]) {
         for &node in self.tie.nodes() {
             let (place, now) = (slave.place(node), broken.binary_search(&node).is_err());
@@ -48,7 +48,7 @@ impl<T: Real> Bonds<T> {
         }
     }
 
-    /// Lists the rows of what holds, and moves them to u; says whether they have changed.
+    /// Lists the rows of the bonded nodes, and linearizes them at u; returns whether they have changed.
     pub(super) fn search(&mut self, slave: &Surface, (t, u, v): (f64, &[T], &[T]), ahead: f64) -> Result<Candidates> {
         let Self { tie, holds, changed, .. } = self;
         let relisted = std::mem::take(changed);
@@ -60,7 +60,7 @@ impl<T: Real> Bonds<T> {
         Ok(Candidates::changed_if(relisted || found == Candidates::Changed))
     }
 
-    /// Which nodes do not stand the forces of their rows, and how many times as large as the strength these are.
+    /// Appends the nodes whose rows exceed the strength, with the ratio of their stress to the strength.
     pub(super) fn overloads(&self, forces: &[T], dimension: usize, broken: &mut Vec<(usize, f64)>) {
         for (row, place) in self.tie.listed() {
             let area = self.tie.area(place).value();

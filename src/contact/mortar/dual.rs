@@ -1,18 +1,18 @@
-//! Dual shape functions of the multiplier on a slave facet, less of them where it is covered in part.
+//! Dual shape functions of the multiplier on a slave facet, blended with standard ones if it is partly covered.
 //!
-//! ψ_a = Σ_b A_ab N_b, A = D M⁻¹, D = diag ∫N_a, M = ∫N_a N_b over the whole facet, has ∫ψ_a N_b = δ_ab ∫N_a (Wohlmuth,
-//! SIAM J. Numer. Anal. 38, 2000). A is the same for all segments, for all triangles and for all parallelograms.
+//! ψ_a = Σ_b A_ab N_b with A = D M⁻¹, D = diag ∫N_a, M = ∫N_a N_b over the whole facet satisfies ∫ψ_a N_b = δ_ab ∫N_a
+//! (Wohlmuth, SIAM J. Numer. Anal. 38, 2000). A is the same for all segments, for all triangles and for all
+//! parallelograms.
 //!
-//! ψ is negative somewhere, so that over a part of a facet ∫ψ_a may be. So the weights are (1 − c) N + c ψ, c a smooth
-//! function of the covered share κ of the facet's area, zero up to [`ENOUGH`]. All that is integrated is linear
-//! in N: it is found with N, and made that of the weights by B = I + c (A − I). Derivatives have besides
-//! δB = c′ (A − I) δκ.
+//! ψ is negative somewhere, so that ∫ψ_a over a part of a facet may be negative. So the weights are (1 − c) N + c ψ,
+//! with c a smooth function of the covered share κ of the facet's area, zero up to [`ENOUGH`]. All integrals are
+//! linear in N. They are found with N, and multiplied by B = I + c (A − I). Derivatives also have δB = c′ (A − I) δκ.
 
 use super::integrals::Sums;
 use super::points::{Column, column};
 use crate::contact::surface::{Base, Facet, add_scaled, middle, norm};
 
-/// The shape functions that gaps are weighted with.
+/// The weights of gaps: standard or dual shape functions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Multiplier {
     #[default]
@@ -20,7 +20,7 @@ pub(super) enum Multiplier {
     Dual,
 }
 
-/// The covered share up to which a facet keeps its own shape functions: with less ∫ψ_a may be near zero.
+/// The covered share up to which a facet keeps the standard shape functions: below, ∫ψ_a may be near zero.
 const ENOUGH: f64 = 0.75;
 
 /// A by the number of corners.
@@ -32,24 +32,24 @@ fn dual(count: usize) -> [[f64; 4]; 4] {
     }
 }
 
-/// c and c′, where the share κ is covered.
+/// c and c′ at the covered share κ.
 fn blend(covered: f64) -> [f64; 2] {
     let s = ((covered - ENOUGH) / (1.0 - ENOUGH)).clamp(0.0, 1.0);
     [s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / (1.0 - ENOUGH)]
 }
 
-/// What a facet's integrals with N are made those of its weights by.
+/// The transformation of a facet's integrals with N to integrals with its weights.
 pub(super) struct Blend {
     count: usize,
     /// B.
     matrix: [[f64; 4]; 4],
-    /// By corner, how ∫N g and ∫N change with the covered area as B does.
+    /// By corner, the derivatives of ∫N g and ∫N with respect to the covered area, through B.
     by_area: [[f64; 2]; 4],
     covered: f64,
 }
 
 impl Blend {
-    /// Makes the sums that a facet's corners have of it, over what is covered, those of its weights.
+    /// Transforms the sums of a facet's corners over its covered part to sums with its weights.
     pub(super) fn of(base: &Base, sums: &mut [Sums; 4]) -> Self {
         let count = base.count();
         let whole = area(base);
@@ -73,7 +73,7 @@ impl Blend {
         Self { count, matrix, by_area, covered }
     }
 
-    /// Makes what nodes add to the rows of a facet's corners that of its weights.
+    /// Transforms the contributions of nodes to the rows of a facet's corners.
     pub(super) fn weigh<'a>(&self, all: impl Iterator<Item = &'a mut [Column; 4]>) {
         for columns in all {
             let found = *columns;
@@ -90,7 +90,8 @@ impl Blend {
         }
     }
 
-    /// Calls `act` with what corners add because the whole of the facet grows, which the covered area is a share of.
+    /// Calls `act` with the contributions of the corners by the growth of the whole facet, which changes the covered
+    /// share.
     pub(super) fn each_of_whole(&self, base: &Base, facet: &Facet, mut act: impl FnMut(usize, [Column; 4])) {
         if self.by_area.iter().flatten().all(|x| *x == 0.0) {
             return;
@@ -108,7 +109,7 @@ impl Blend {
     }
 }
 
-/// A facet's area over the length of the product of its tangents in the middle.
+/// A facet's area divided by the length of the product of its tangents at the middle.
 fn factor(count: usize) -> f64 {
     [1.0, 0.5, 4.0][count - 2]
 }
@@ -122,7 +123,7 @@ pub(super) fn area(base: &Base) -> f64 {
 mod tests {
     use super::*;
 
-    /// Shape functions in points of equal area.
+    /// Shape functions at points of equal area.
     fn points(count: usize) -> Vec<[f64; 4]> {
         let size = 200;
         let line = |k: usize| (k as f64 + 0.5) / size as f64;
@@ -165,7 +166,7 @@ mod tests {
             let (points, matrix) = (points(count), dual(count));
             for percent in 1..=100 {
                 let [c, _] = blend(percent as f64 / 100.0);
-                // What is left of the weight beyond N/3: where it is greatest is not covered, at the worst.
+                // The weight less N/3. In the worst case its greatest values are not covered.
                 let excess = |n: &[f64; 4]| {
                     let psi = (0..4).map(|b| matrix[0][b] * n[b]).sum::<f64>();
                     (1.0 - c) * n[0] + c * psi - n[0] / 3.0

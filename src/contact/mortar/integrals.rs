@@ -1,18 +1,18 @@
-//! Weighted gaps over the facets of a surface, and their derivatives by the positions of all nodes.
+//! Weighted gaps over the facets of a surface, and their derivatives with respect to the positions of all nodes.
 //!
-//! With points of the slave facet that stay on its material, the normal n of its middle, area J and the master facet's
-//! normal ν where the ray meets it, the gap at a point is g = n·(x_m − x_s), and
+//! For material points of the slave facet, with the normal n at its middle, area J, and the master facet's normal ν
+//! at the intersection with the ray, the gap at a point is g = n·(x_m − x_s), and
 //!
 //! δg = μ·(δx_m − δx_s − g δn), μ = ν/(ν·n), δ∫N g dA = Σ ω N (J δg + g δJ):
 //!
-//! where the ray moves on along the master facet nothing changes to first order but what μ holds. The limits of the
-//! common parts move as well: over the sides that facets share this adds nothing, since gaps are continuous there;
-//! where the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, m outward in the plane. Sums are invariant under
-//! translations and rotations, term by term: so forces along the derivative conserve linear and angular momentum to
+//! The motion of the intersection along the master facet is already contained in μ, to first order. The limits of the
+//! common parts move as well. Over sides that facets share this adds nothing, since gaps are continuous there. Where
+//! the master ends it adds ∮ N g m·(δx_m − δx_s − g δn) ds, with m outward in the plane. Every term is invariant
+//! under translations and rotations, so that forces along the derivative conserve linear and angular momentum to
 //! rounding.
 //!
-//! Where surfaces lie outside of their facets by offsets o the gap is n·(x_m − x_s) − o_s − o_m. What is multiplied by
-//! δx_m − δx_s − (n·(x_m − x_s)) δn is then μ + ∇o_m, ∇o_m the slope of o_m where the foot of the ray moves on.
+//! With offsets o of the surfaces from their facets the gap is n·(x_m − x_s) − o_s − o_m. Then δx_m − δx_s − (n·(x_m
+//! − x_s)) δn is multiplied by μ + ∇o_m, with the gradient ∇o_m of o_m by the motion of the intersection.
 
 use super::dual::{self, Blend, Multiplier};
 use super::pairs::Pairs;
@@ -21,11 +21,11 @@ use super::points::{self, Addends, Column, NORMAL, OTHERS, OWN, Points, column};
 use super::second_order::{Pair, Shares};
 use crate::contact::surface::{Base, Facet, Offsets, Point, RimSample, Sample, Surface, add_scaled, dot};
 
-/// Least share of what a node's shape function would cover for a row: below, one node alone may look at a sliver.
+/// Least covered share of a node's area for a row. A smaller part may be a sliver.
 const LEAST: f64 = 1e-6;
 
 impl Offsets<'_> {
-    /// At the corners of a slave facet and of a master facet, without the factor.
+    /// The offsets at the corners of a slave facet and of a master facet, without the factor.
     fn between(&self, slave: &Facet, master: &Facet) -> Outside {
         Outside([slave, master].map(|facet| self.at_corners(facet)))
     }
@@ -35,17 +35,17 @@ impl Offsets<'_> {
 struct Outside([[f64; 4]; 2]);
 
 impl Outside {
-    /// Their sum where the shape functions are these.
+    /// Their sum at the points with these shape functions.
     fn at(&self, slave: &[f64; 4], master: &[f64; 4]) -> f64 {
         let Self([own, others]) = self;
         (0..4).map(|k| slave[k] * own[k] + master[k] * others[k]).sum()
     }
 }
 
-/// What is integrated for a slave node; N are the weights, be they shape functions or others.
+/// Integrals for a slave node; N are its weights, standard or dual.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
-    /// ∫N dA over what is covered, and over all facets of the node.
+    /// ∫N dA over the covered part, and over all facets of the node.
     pub(super) area: f64,
     whole: f64,
     /// ∫N g dA.
@@ -58,7 +58,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Adds the whole of a slave facet to the sums of its nodes; returns their places.
+    /// Adds the area of a slave facet to the sums of its nodes; returns their places.
     fn begin<'s>(sums: &mut [Self], slave: &'s Surface, facet: usize, base: &Base) -> &'s [usize; 4] {
         let (places, count) = (slave.places(facet), base.count());
         let whole = dual::area(base) / count as f64;
@@ -66,12 +66,12 @@ impl Sums {
         places
     }
 
-    /// Adds what is covered of a slave facet to the sums of its nodes.
+    /// Adds the covered part of a slave facet to the sums of its nodes.
     fn end(sums: &mut [Self], places: &[usize], own: &[Self; 4]) {
         places.iter().zip(own).for_each(|(&place, own)| sums[place].add_scaled(1.0, own));
     }
 
-    /// Adds all that is summed over what is covered.
+    /// Adds all integrals over the covered part.
     pub(super) fn add_scaled(&mut self, factor: f64, other: &Self) {
         self.area += factor * other.area;
         self.moment += factor * other.moment;
@@ -80,7 +80,7 @@ impl Sums {
         self.normal = add_scaled(self.normal, factor, other.normal);
     }
 
-    /// Adds a point, for a node whose shape function is `share` there.
+    /// Adds a quadrature point, for a node with the shape function `share` there.
     fn add(&mut self, share: f64, area: f64, gap: f64, offset: f64) {
         let weight = share * area;
         self.area += weight;
@@ -88,7 +88,7 @@ impl Sums {
         self.offset += weight * offset;
     }
 
-    /// Whether enough is covered for a row.
+    /// Whether the covered part is large enough for a row.
     pub(super) fn is_covered(&self) -> bool {
         self.area > LEAST * self.whole
     }
@@ -98,12 +98,12 @@ impl Sums {
         self.moment / self.area
     }
 
-    /// The same; NaN unless enough is covered.
+    /// As [`gap`](Self::gap); NaN unless the covered part is large enough.
     pub(super) fn gap_if_covered(&self) -> f64 {
         if self.is_covered() { self.gap() } else { f64::NAN }
     }
 
-    /// The mean of the offsets of both surfaces, where they have their full size.
+    /// The mean of the offsets of both surfaces, at full size.
     pub(super) fn offset(&self) -> f64 {
         self.offset / self.area
     }
@@ -119,11 +119,11 @@ impl Sums {
     }
 }
 
-/// What a row has of a node, before it is divided by the covered area.
+/// The entry of a row for a node, before it is divided by the covered area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub(super) node: usize,
-    /// The derivatives of ∫N g dA and of ∫N dA by the position of the node.
+    /// The derivatives of ∫N g dA and of ∫N dA with respect to the position of the node.
     pub(super) moment: Point,
     pub(super) area: Point,
     /// ∫N_row N_node dA: positive for slave nodes, negative for master nodes.
@@ -137,20 +137,20 @@ impl Entry {
     }
 }
 
-/// Sums by place of the slave node, and what rows are made of.
+/// Sums by place of the slave node, and the contributions to rows.
 #[derive(Debug, Default)]
 pub(super) struct Integrals {
     pub(super) sums: Vec<Sums>,
     parts: Parts,
-    /// Nodes of master facets over one slave facet, and what they add to the rows of its corners.
+    /// Nodes of master facets over one slave facet, and their contributions to the rows of its corners.
     others: Vec<(usize, [Column; 4])>,
     points: Points,
-    /// The row that was asked for last, and memory for it.
+    /// The row requested last, and work space.
     row: Vec<Entry>,
     heads: Vec<[usize; 3]>,
 }
 
-/// What is summed over one slave facet.
+/// Sums over one slave facet.
 #[derive(Default)]
 struct Own {
     sums: [Sums; 4],
@@ -159,7 +159,7 @@ struct Own {
     is_touched: bool,
 }
 
-/// Adds what a node adds to the rows of a slave facet's corners to what it has added before.
+/// Adds the contribution of a node to the rows of a slave facet's corners.
 fn add_to(others: &mut Vec<(usize, [Column; 4])>, node: usize, columns: &[Column; 4]) {
     match others.iter_mut().find(|(other, _)| *other == node) {
         Some((_, sums)) => sums.iter_mut().zip(columns).for_each(|(sum, column)| points::add(sum, column)),
@@ -168,8 +168,8 @@ fn add_to(others: &mut Vec<(usize, [Column; 4])>, node: usize, columns: &[Column
 }
 
 impl Integrals {
-    /// The entries of the row of a slave node, around which there are these facets (with the corner that it is of
-    /// each), ascending by node.
+    /// The entries of the row of a slave node, ascending by node. `around` are the facets around the slave node, with
+    /// their corners at this node.
     pub(super) fn row(&mut self, around: &[(usize, usize)]) -> &[Entry] {
         let Self { parts, row, heads, .. } = self;
         row.clear();
@@ -179,7 +179,7 @@ impl Integrals {
         row
     }
 
-    /// Integrates as [`integrate`](Self::integrate) does, without what derivatives need: areas and gaps.
+    /// As [`integrate`](Self::integrate), without the data for derivatives: areas and gaps.
     pub(super) fn sum(
         &mut self,
         [slave, master]: [&Surface; 2],
@@ -218,7 +218,7 @@ impl Integrals {
         }
     }
 
-    /// Integrates over all facets of the slave surface what the master facets listed for each cover.
+    /// Integrates, over all facets of the slave surface, the parts covered by the master facets listed for each.
     pub(super) fn integrate(
         &mut self,
         [slave, master]: [&Surface; 2],
@@ -243,7 +243,7 @@ impl Integrals {
         }
     }
 
-    /// Adds what master facets cover of a slave facet to its parts; returns its sums.
+    /// Adds the part of a slave facet covered by master facets to its parts; returns its sums.
     fn integrate_facet(
         &mut self,
         (base, facet): (&Base, &Facet),
@@ -272,7 +272,7 @@ impl Integrals {
         own.sums
     }
 
-    /// Adds what a master facet covers.
+    /// Adds the part covered by one master facet.
     fn integrate_pair(
         &mut self,
         (base, facet): (&Base, &Facet),

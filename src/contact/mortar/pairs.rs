@@ -1,4 +1,4 @@
-//! Which facets of two surfaces may meet: lists kept over many steps, and those of them that are near now.
+//! Pairs of facets that may be in contact: lists kept over many steps, and the pairs that are near now.
 
 use crate::contact::surface::{Base, Bounds, Material, Neighborhood, Point, Surface};
 
@@ -6,13 +6,13 @@ use crate::contact::surface::{Base, Bounds, Material, Neighborhood, Point, Surfa
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
     lists: Neighborhood,
-    /// The boxes of the master's facets and their normals, which each is asked for by several slave facets, and the
-    /// normals of the slave's, for which their neighbors ask.
+    /// The boxes and normals of the master's facets, each used by several slave facets, and the normals of the
+    /// slave's facets, used by their neighbors.
     masters: Vec<(Bounds, Option<Point>)>,
     normals: Vec<Option<Point>>,
     starts: Vec<usize>,
     near: Vec<usize>,
-    /// What these were before.
+    /// The previous `starts` and `near`.
     before: [Vec<usize>; 2],
 }
 
@@ -23,14 +23,14 @@ impl Pairs {
         self.starts.clear();
     }
 
-    /// Lists anew what is within `range`.
+    /// Rebuilds the lists of facets within `range`.
     pub(super) fn build(&mut self, [slave, master]: [&Surface; 2], positions: &[Point], range: f64) {
         self.lists.build(slave.boxes(positions), master.boxes(positions), range);
     }
 
-    /// Takes from the lists the pairs that face each other within `range`, are not in each other by more than `depth`,
-    /// do not belong to facets behind sharp edges, and do not see each other through both bodies; says whether they are
-    /// others than before. (The result does not depend on the age of the lists.)
+    /// Selects from the lists the pairs that face each other within `range`, penetrate by at most `depth`, do not
+    /// belong to facets behind sharp edges, and do not face each other through both bodies. Returns whether the pairs
+    /// have changed. The result does not depend on the age of the lists.
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],

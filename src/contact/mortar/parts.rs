@@ -1,24 +1,24 @@
-//! What slave facets add to the rows of their corners, facet by facet, and rows as the sums of it.
+//! Contributions of slave facets to the rows of their corners, and rows as the sums over facets.
 
 use super::points::{Column, add};
 
-/// Node by node what facets add: large surfaces have hundreds of megabytes of it, so that it is written once, in the
-/// order in which rows read it.
+/// Contributions of facets, by node. Large surfaces have hundreds of megabytes of them, so they are written once, in
+/// the order in which rows read them.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
-    /// Of the present facet: nodes, and what they add to the rows of its corners, in the order in which it was found.
+    /// For the present facet: nodes, and their contributions to the rows of its corners, in the order of the
+    /// integration.
     present: Vec<(usize, [Column; 4])>,
     sorted: Vec<(usize, usize)>,
-    /// Facet by facet the nodes, ascending, and where those of each facet begin.
+    /// For each facet the nodes, ascending, and the first entry of each facet.
     nodes: Vec<usize>,
     starts: Vec<usize>,
-    /// Facet by facet and corner by corner what these nodes add, and where those of each facet begin.
+    /// For each facet and corner the contributions of these nodes, and the first entry of each facet.
     columns: Vec<Column>,
     blocks: Vec<usize>,
 }
 
-/// What is next of a facet that a row has something of: the place of the node, the end of the facet's nodes, and the
-/// place of the column.
+/// Read positions of a row in one of its facets: the next node, the end of the facet's nodes, and the next column.
 type Head = [usize; 3];
 
 impl Parts {
@@ -31,17 +31,17 @@ impl Parts {
         self.blocks.clear();
     }
 
-    /// Adds what a node adds to the rows of the present facet's corners.
+    /// Appends the contribution of a node to the rows of the present facet's corners.
     pub(super) fn push(&mut self, node: usize, columns: [Column; 4]) {
         self.present.push((node, columns));
     }
 
-    /// All that the present facet adds so far.
+    /// All contributions of the present facet so far.
     pub(super) fn of_facet_mut(&mut self) -> impl Iterator<Item = &mut [Column; 4]> {
         self.present.iter_mut().map(|(_, columns)| columns)
     }
 
-    /// Goes on to the next facet, the present one having so many corners.
+    /// Ends the present facet, which has this number of corners.
     pub(super) fn end_facet(&mut self, corners: usize) {
         let Self { present, sorted, nodes, starts, columns, blocks } = self;
         sorted.clear();
@@ -56,8 +56,8 @@ impl Parts {
         present.clear();
     }
 
-    /// Calls `act` with the nodes of a row, ascending, and what the facets around its node add, given with the corner
-    /// that it is of each, summed in the order in which it was found.
+    /// Calls `act` with the nodes of a row, ascending, and the sum of the contributions of the facets `around` its
+    /// node, which are given with their corner at this node.
     pub(super) fn each_of_row(
         &self,
         around: &[(usize, usize)],
@@ -99,7 +99,7 @@ mod tests {
         let mut parts = Parts::default();
         parts.clear();
         let column = |value: f64| [value; 8];
-        // Two facets with nothing between them; the second one has node 3 twice.
+        // Three facets: the second one is empty, and the third one has node 3 twice.
         for entries in [&[(7, 1.0), (2, 2.0)][..], &[], &[(3, 10.0), (7, 20.0), (3, 40.0)]] {
             for &(node, value) in entries {
                 parts.push(node, [value, 100.0 * value, 0.0, 0.0].map(column));

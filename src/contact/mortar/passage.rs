@@ -1,4 +1,4 @@
-//! What surfaces have gone through in a step: weighted gaps along the way.
+//! Checks whether surfaces have passed through each other in a step, by weighted gaps along the motion.
 
 use super::Mortar;
 use super::integrals::Integrals;
@@ -8,26 +8,26 @@ use crate::contact::{LARGEST_MISS, Stride};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Share of the smallest facet that the surfaces may move against each other without being looked at, and that they
-/// move between two looks.
+/// Relative motion, as a share of the smallest facet, up to which surfaces are not checked; also the motion between
+/// two checks.
 const FINE: f64 = 0.125;
 
-/// The most looks a step. What moves farther is refused where its way leads through the other surface's box.
+/// Largest number of checks in a step. Faster surfaces are rejected if they pass through each other's box.
 const LOOKS: u32 = 512;
 
-/// Memory for looking at a step.
+/// Work space for the check of a step.
 #[derive(Debug, Default)]
 pub(super) struct Look {
     ends: [Vec<Point>; 2],
     positions: Vec<Point>,
     pairs: Pairs,
     integrals: Integrals,
-    /// Whether the gap of each slave node was open, or unknown, at the start.
+    /// Whether each slave node was open, or uncovered, at the start.
     outside: Vec<bool>,
 }
 
 impl<T: Real> Mortar<T> {
-    /// Refuses a step in which the surfaces have gone into each other on their way, or have been stopped apart.
+    /// Rejects a step in which the surfaces penetrated each other, or were stopped apart.
     pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
         let (way, finest) = (motions[0].farthest(&motions[1]), self.finest());
@@ -55,7 +55,7 @@ impl<T: Real> Mortar<T> {
         if !swept[0].inflated(reach).intersects(&swept[1]) {
             return Ok(());
         }
-        // (What is deeper is not found, however long the way.)
+        // Deeper facets are not found, for any length of the motion.
         let deepest = 0.5 * depth;
         let (fine, limit) = (fine.min(deepest), -deepest.min(LARGEST_MISS * way));
         let name = |place: usize| (self.slave.nodes()[place], 0);
@@ -79,7 +79,7 @@ impl<T: Real> Mortar<T> {
             integrals.sum(surfaces, positions, offsets, self.multiplier, pairs);
             for (place, sums) in integrals.sums.iter().enumerate().filter(|(_, sums)| sums.is_covered()) {
                 if look == 0 {
-                    // What is inside already comes out as it may.
+                    // A node that is already inside may leave freely.
                     outside[place] = sums.gap() >= limit;
                 } else if outside[place] && sums.gap() < limit && !self.law.is_compliant() {
                     return Err(step.refuse(name(place), "went into the other surface", way, sums.gap()));

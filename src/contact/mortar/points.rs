@@ -1,10 +1,10 @@
-//! What the points of a slave facet that a master facet covers add to the rows of its corners: gathered for all points
-//! of a pair, and then summed at once.
+//! Contributions of the quadrature points of a pair of facets to the rows of the slave facet's corners. They are
+//! collected for all points of the pair and then summed at once.
 
 use crate::contact::surface::{Base, Point, RimSample, add_scaled, dot, middle, norm};
 use crate::real::Kernels;
 
-/// What a node adds to a row, as an [`Entry`](super::integrals::Entry) has it: moment, area, share, and nothing.
+/// Contribution of a node to a row, as in [`Entry`](super::integrals::Entry): moment, area, share, and zero.
 pub(super) type Column = [f64; 8];
 
 /// A column by its parts.
@@ -19,26 +19,26 @@ pub(super) fn add(sum: &mut Column, column: &Column) {
     sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
 }
 
-/// What a point adds to a row whose shape function is one there: by corner of the slave facet, by corner of the master
-/// facet, and last what the derivative of n is multiplied by (its share has no meaning).
+/// Contributions of a point to a row whose shape function is one there: for the corners of the slave facet, for the
+/// corners of the master facet, and last the factor of the derivative of n (its share has no meaning).
 pub(super) type Addends = [Column; 9];
 
-/// Where the corners of the slave facet are among addends, those of the master facet, and n.
+/// Positions among addends: first corner of the slave facet, first corner of the master facet, and n.
 pub(super) const OWN: usize = 0;
 pub(super) const OTHERS: usize = 4;
 pub(super) const NORMAL: usize = 8;
 
-/// Points of a pair of facets.
+/// Quadrature points of a pair of facets.
 #[derive(Debug, Default)]
 pub(super) struct Points {
-    /// The shape functions of the slave facet's corners, and what they are multiplied by.
+    /// The shape functions of the slave facet's corners, and the addends that they multiply.
     shares: Vec<[f64; 4]>,
-    /// As many as there were ever; those behind the last point have no meaning.
+    /// Never shrinks; entries behind the last point have no meaning.
     addends: Vec<Addends>,
 }
 
 impl Points {
-    /// Takes a point, all of whose addends are to be written.
+    /// Appends a point; the caller must write all of its addends.
     pub(super) fn push(&mut self, shares: [f64; 4]) -> &mut Addends {
         let place = self.shares.len();
         self.shares.push(shares);
@@ -52,7 +52,7 @@ impl Points {
         self.shares.is_empty()
     }
 
-    /// Adds that the rim of the master moves over the slave facet, whose gaps are the distance less `offset`.
+    /// Appends the effect of the master's rim that moves over the slave facet. Gaps are the distance less `offset`.
     pub(super) fn push_rim(&mut self, sample: &RimSample, offset: f64) {
         let RimSample { length, slave, master, gap: distance, outward } = *sample;
         let [moment, area] = [length * (distance - offset), length].map(|x| outward.map(|along| x * along));
@@ -66,12 +66,12 @@ impl Points {
         addends[NORMAL] = times(-distance);
     }
 
-    /// Adds all points to the sums of the slave facet's corners, and forgets them.
+    /// Adds all points to the sums of the slave facet's corners, and removes them.
     pub(super) fn add_to(&mut self, sums: &mut [Addends; 4]) {
         for (a, sums) in sums.iter_mut().enumerate() {
             let (sums, addends) = (sums.as_flattened_mut(), |k: usize| self.addends[k].as_flattened());
             let whole = self.shares.len() - self.shares.len() % 4;
-            // (Several at a time: the sums are read and written less often.)
+            // Four points at a time save memory traffic.
             for k in (0..whole).step_by(4) {
                 let shares = std::array::from_fn::<f64, 4, _>(|i| self.shares[k + i][a]);
                 f64::add_all(shares, std::array::from_fn(|i| addends(k + i)), sums);
@@ -82,13 +82,12 @@ impl Points {
     }
 }
 
-/// Takes what a corner of the master facet has, by corner of the slave facet, out of sums.
+/// Removes the contribution of a corner of the master facet from the sums; returns it by corner of the slave facet.
 pub(super) fn take_other(sums: &mut [Addends; 4], corner: usize) -> [Column; 4] {
     sums.each_mut().map(|sums| std::mem::take(&mut sums[OTHERS + corner]))
 }
 
-/// What the corners of a slave facet have, by these and by the corners whose rows it is, with the turning of its
-/// normal.
+/// Contributions of a slave facet's corners to the rows of each of its corners, including the rotation of its normal.
 pub(super) fn own(sums: &mut [Addends; 4], base: &Base) -> [[Column; 4]; 4] {
     let (count, length) = (base.count(), norm(base.product));
     // δn = (I − n nᵀ) δ(t₁ × t₂) / |t₁ × t₂|.

@@ -6,7 +6,7 @@ use crate::contact::GapRates;
 use crate::contact::surface::{Point, SecondDifference};
 use crate::real::Real;
 
-/// Memory for rates.
+/// Work space for rates.
 #[derive(Debug, Default)]
 pub(super) struct Rates {
     integrals: Integrals,
@@ -14,8 +14,8 @@ pub(super) struct Rates {
 }
 
 impl<T: Real> Mortar<T> {
-    /// ∂g/∂t, which is that of the offsets, and Ġ v + ∂ġ/∂t, by differences of integrals without derivatives. A node
-    /// that nothing lies over on the way has the row that it had: none of the latter.
+    /// ∂g/∂t, from the offsets, and Ġ v + ∂ġ/∂t by differences of integrals. A node that becomes uncovered along the
+    /// motion keeps its row: its Ġ v + ∂ġ/∂t is zero.
     pub(super) fn rates_along(&mut self, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) {
         let Self { nodes, slave, master, thickness, pairs, rows, rates, ahead, multiplier, integrals: known, .. } =
             self;
@@ -26,7 +26,7 @@ impl<T: Real> Mortar<T> {
         }
         let all = || nodes.bodies().iter().flatten();
         let gaps = |time: f64, positions: &[Point], list: &mut Vec<f64>| {
-            // (Rows are linearized where the state is, as a rule.)
+            // Usually the rows are linearized at the current state.
             let bits = |list: &[Point], node: usize| list[node].map(f64::to_bits);
             let is_there = |&node: &usize| bits(positions, node) == bits(&nodes.positions, node);
             let is_known = time.to_bits() == t.to_bits() && all().all(is_there);

@@ -1,4 +1,4 @@
-//! The rows of weighted gaps: entries of G, tangents, and where contacts are.
+//! The rows of weighted gaps: entries of G, tangents, and positions of contacts.
 
 use super::integrals::{Entry, Integrals};
 use crate::contact::ContactJacobian;
@@ -6,19 +6,18 @@ use crate::contact::affine_rows::AffineRows;
 use crate::contact::surface::{Nodes, Point, Surface};
 use crate::real::Real;
 
-/// The rows of a search, where they are linearized.
+/// The rows of a search, at their point of linearization.
 #[derive(Debug)]
 pub(super) struct Rows<T> {
     pub(super) affine: AffineRows<T>,
     /// The slave node of each row, by its place among the nodes of its surface.
     pub(super) places: Vec<usize>,
     pub(super) spots: Vec<Spot>,
-    /// `dimension` − 1 rows each, if there is friction.
+    /// `dimension` − 1 tangents per row, if there is friction.
     pub(super) tangents: ContactJacobian<T>,
 }
 
-/// What rows are made with: the nodes, the slave, whether there is friction, the factor of offsets, and the
-/// displacements.
+/// Data from which rows are made: nodes, slave, whether there is friction, factor of offsets, and displacements.
 pub(super) struct Made<'a, T> {
     pub(super) nodes: &'a Nodes,
     pub(super) slave: &'a Surface,
@@ -27,14 +26,14 @@ pub(super) struct Made<'a, T> {
     pub(super) u: &'a [T],
 }
 
-/// Where a contact is.
+/// Position and area of a contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spot {
     pub(super) position: Point,
     pub(super) normal: Point,
-    /// The covered area that belongs to the node.
+    /// The covered area of the node.
     pub(super) area: f64,
-    /// The mean offset of the two surfaces in full size, and the factor that the gap was made with.
+    /// The mean offset of the two surfaces at full size, and its factor in the gap.
     pub(super) offset: f64,
     pub(super) factor: f64,
 }
@@ -56,7 +55,7 @@ impl<T: Real> Rows<T> {
         self.tangents.clear();
     }
 
-    /// Appends the row of a slave node, if it is covered; says whether it is.
+    /// Appends the row of a slave node, if it is covered; returns whether it is.
     pub(super) fn push(&mut self, place: usize, integrals: &mut Integrals, made: &Made<'_, T>) -> bool {
         let Made { nodes, slave, rubs, factor, u } = *made;
         let sums = integrals.sums[place];
@@ -77,7 +76,7 @@ impl<T: Real> Rows<T> {
         true
     }
 
-    /// Appends a row as another list has it.
+    /// Appends a copy of a row of another list.
     pub(super) fn keep(&mut self, other: &Self, row: usize, tangents: usize) {
         self.affine.keep(&other.affine, row);
         self.places.push(other.places[row]);

@@ -1,21 +1,22 @@
-//! What facets of second order add to weighted gaps: their points lie off the linear parts that are cut against each
-//! other.
+//! Contributions of facets of second order to weighted gaps: their points lie off the linear parts that are
+//! intersected.
 //!
-//! With x = x_lin + c, c = Σ (N_b − w_b) x_b, N the shape functions of second order and w those of the part, the gap is
-//! that of the parts and n·(c_m − c_s). Its derivative is n·(δc_m − δc_s) + δn·(c_m − c_s), and n·c_m changes as its
-//! foot moves on along the part: as with the offsets of `integrals.rs`, its slope s makes μ − s of μ.
+//! With x = x_lin + c, c = Σ (N_b − w_b) x_b, the shape functions N of second order and w of the linear part, the gap
+//! is the gap of the parts plus n·(c_m − c_s). Its derivative is n·(δc_m − δc_s) + δn·(c_m − c_s). Also, n·c_m
+//! changes as the intersection moves along the part: its gradient s replaces μ by μ − s, as with the offsets in
+//! `integrals.rs`.
 
 use super::points::{Column, column};
 use crate::contact::surface::{Base, ByNode, Facet, Point, Sample, add_scaled, dot, sub};
 
-/// A pair of facets, one of which at least is a part of one of second order.
+/// A pair of facets of which at least one is a part of a facet of second order.
 pub(super) struct Pair<'a> {
     slave: &'a Facet,
     master: &'a Facet,
     positions: &'a [Point],
 }
 
-/// What is off the linear parts at a point.
+/// The deviation from the linear parts at a point.
 pub(super) struct Excess {
     slave: ByNode,
     master: ByNode,
@@ -24,17 +25,17 @@ pub(super) struct Excess {
     pub(super) apart: Point,
 }
 
-/// Sums of what shape functions have beyond the linear ones, by corner of the slave facet and node of a facet.
+/// Integrals of the shape functions less the linear ones, by corner of the slave facet and node of a facet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shares([ByNode; 4]);
 
 impl<'a> Pair<'a> {
-    /// None of two linear facets.
+    /// None for two linear facets.
     pub(super) fn new(slave: &'a Facet, master: &'a Facet, positions: &'a [Point]) -> Option<Self> {
         (slave.whole.is_some() || master.whole.is_some()).then_some(Self { slave, master, positions })
     }
 
-    /// Where the shape functions of the parts are these.
+    /// The deviation at the points with these shape functions of the parts.
     pub(super) fn at(&self, slave: &[f64; 4], master: &[f64; 4]) -> Excess {
         let excess = |facet: &Facet, weights| facet.whole.map_or([0.0; 9], |whole| whole.excess(weights));
         let (slave, master) = (excess(self.slave, slave), excess(self.master, master));
@@ -43,7 +44,7 @@ impl<'a> Pair<'a> {
         Excess { slave, master, off, apart }
     }
 
-    /// How far a gap along n is from that of the parts.
+    /// The gap along n less the gap of the linear parts.
     pub(super) fn gap(&self, base: &Base, slave: &[f64; 4], master: &[f64; 4]) -> f64 {
         dot(base.normal, self.at(slave, master).apart)
     }
@@ -67,7 +68,8 @@ impl Excess {
 }
 
 impl Shares {
-    /// Calls `act` with the nodes of a facet of second order, and what they add to the rows of a slave facet's corners.
+    /// Calls `act` with the nodes of a facet of second order and their contributions to the rows of a slave facet's
+    /// corners.
     pub(super) fn each_column(&self, facet: &Facet, normal: Point, mut act: impl FnMut(usize, [Column; 4])) {
         if facet.whole.is_none() {
             return;
