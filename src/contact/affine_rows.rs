@@ -1,14 +1,14 @@
-//! Rows of G with the gaps where they are linearized: in between two linearizations gaps are affine.
+//! Rows of G with the gaps at their point of linearization. Between two linearizations gaps are affine.
 
 use super::ContactJacobian;
 use crate::real::Real;
 
-/// Rows, gaps g* there, and the displacements u*: `g = g* + G (u − u*)`.
+/// Rows, gaps g* and displacements u* of the linearization: `g = g* + G (u − u*)`.
 #[derive(Debug)]
 pub(super) struct AffineRows<T> {
     pub(super) jacobian: ContactJacobian<T>,
     gaps: Vec<f64>,
-    /// One an entry of G.
+    /// u*, one value per entry of G.
     displacements: Vec<T>,
 }
 
@@ -60,7 +60,7 @@ impl<T: Real> AffineRows<T> {
         self.gaps.push(gap);
     }
 
-    /// Appends a row as another list has it.
+    /// Appends a copy of a row of another list.
     pub(super) fn keep(&mut self, other: &Self, row: usize) {
         let range = other.jacobian.pointers[row]..other.jacobian.pointers[row + 1];
         self.jacobian.dofs.extend_from_slice(&other.jacobian.dofs[range.clone()]);

@@ -2,16 +2,16 @@
 
 use crate::error::{Error, Result};
 
-/// What a bond between two surfaces bears: stresses (force/area; force/length in two dimensions) in tension, along the
-/// normal, and in shear, across it.
+/// The strength of a bond between two surfaces: stresses (force/area; force/length in two dimensions) in tension,
+/// along the normal, and in shear, across it.
 ///
-/// A bond breaks where the tension σ and the shear τ that it holds together reach
+/// A bond breaks when its tension σ and its shear τ reach
 ///
 /// √((⟨σ⟩/σ_max)² + (τ/τ_max)²) = 1, ⟨σ⟩ = max(σ, 0),
 ///
-/// the quadratic criterion of stresses that is usual for cohesive interfaces (Camanho and Dávila, NASA/TM-2002-211737,
-/// eq. 8). Compression breaks nothing. It breaks as a whole and at once: no energy is held by it, and none is needed to
-/// open what is broken (`docs/contact.md`, bonds).
+/// the quadratic stress criterion that is usual for cohesive interfaces (Camanho and Dávila, NASA/TM-2002-211737, eq.
+/// 8). Compression does not break it. A bond breaks as a whole and at once: it stores no energy, and a broken bond
+/// opens without energy (`docs/contact.md`, bonds).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BondStrength {
@@ -20,7 +20,7 @@ pub struct BondStrength {
 }
 
 impl BondStrength {
-    /// σ_max and τ_max. Infinite where tension, or shear, never breaks it.
+    /// σ_max and τ_max. An infinite value means that tension, or shear, never breaks the bond.
     ///
     /// # Errors
     ///
@@ -49,7 +49,7 @@ impl BondStrength {
         }
     }
 
-    /// How many times as large as the strength stresses are, tension (negative in compression) and shear: it breaks at
+    /// The ratio of the stresses to the strength, for tension (negative in compression) and shear: the bond breaks at
     /// 1.
     pub fn load(&self, [tension, shear]: [f64; 2]) -> f64 {
         (tension.max(0.0) / self.tension).hypot(shear / self.shear)
@@ -61,13 +61,13 @@ impl BondStrength {
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BrokenBond {
-    /// The constraint, by its place in the order in which they were given.
+    /// The constraint, by its index in the order in which constraints were added.
     pub constraint: usize,
     /// The bond: the [feature](super::ContactId::feature) of its rows.
     pub feature: usize,
     /// The end of the last step in which it held.
     pub time: f64,
-    /// The force at that time over the strength, from 1: by how much more the step has taken it past its strength.
+    /// The force at that time divided by the strength, at least 1.
     pub load: f64,
 }
 

@@ -1,8 +1,8 @@
-//! The dofs of a constraint as one list without repetitions, and the places of dofs there.
+//! The dofs of a constraint as a list without repetitions, and the places of dofs in it.
 
 use std::collections::HashMap;
 
-/// Dofs in the order in which they were first named.
+/// Dofs in the order in which they were first added.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DofList {
     dofs: Vec<usize>,

@@ -54,9 +54,9 @@ pub(super) fn check_angle(angle: f64) -> Result<()> {
 /// ([`search`](ContactConstraint::search)): edges that meet, and edges that may meet within the step, by their
 /// velocities and a tenth of an edge. In between gaps are affine, and rows [`follow`](ContactConstraint::follow) the
 /// contact of the step. [`rates`](ContactConstraint::rates) contain the second derivative of g along the motion. If
-/// the closest points lie beyond an end by a share x of an edge of length l, the gap is that of the lines plus 2 l
-/// x²/(x + 0.1): gaps and rows are continuous where edges begin to meet or slide off each other. Geometry is computed
-/// in `f64` in every run.
+/// the closest points lie beyond an end by a share x of an edge of length l, the gap exceeds the gap of the lines by
+/// 2 l x²/(x + 0.1): gaps and rows are continuous where edges begin to meet or slide off each other. Geometry is
+/// computed in `f64` in every run.
 ///
 /// Edges that touch, within 2 % of the shorter one, are in contact even if the normal is up to 30° outside the
 /// normals of the facets: in the dent that an edge makes, the normal may lie outside of them.
@@ -281,7 +281,7 @@ impl<T: Real> EdgeToEdge<T> {
     }
 
     /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the velocity of the closest material point of the
-    /// first edge relative to that of the second.
+    /// first edge relative to the one of the second edge.
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
         self.friction = coefficient;

@@ -13,36 +13,37 @@ type Tangents<'a, T> = Box<dyn FnMut(f64, &[T], &mut [T]) -> [[T; 2]; 2] + Send 
 struct Friction<'a, T> {
     coefficient: f64,
     function: Tangents<'a, T>,
-    /// The places of the dofs with the weights of each tangent, where the row is linearized.
+    /// For each tangent the places of the dofs and their weights, at the point of linearization.
     rows: Vec<Vec<(usize, T)>>,
 }
 
-/// A row and where it is linearized.
+/// A row and its point of linearization.
 struct Row<'a, T> {
     function: Function<'a, T>,
-    /// The places of the dofs with the gradient there.
+    /// The places of the dofs and the gradient there.
     entries: Vec<(usize, T)>,
     place: Vec<T>,
-    /// Whether there is no gradient there: then there is no gap.
+    /// Whether the gradient there is not finite: then the gap is NaN.
     broken: bool,
     friction: Option<Friction<'a, T>>,
 }
 
 /// Any number of rows `g(t, x) ≥ 0`, each a smooth function of the displacements x of some dofs.
 ///
-/// The function is called with t, x, the velocities v of the same dofs, and a slice for the gradient ∂g/∂x, all in the
-/// order of the dofs. It writes the whole gradient and returns
+/// The function is called with t, x, the velocities v of the same dofs, and a slice for the gradient ∂g/∂x, all in
+/// the order of the dofs. It writes the whole gradient and returns
 ///
 /// * the gap g (length),
 /// * its rate ∂g/∂t at fixed x (length/time), zero if nothing but x moves it,
 /// * its acceleration d²/ds² g(t + s, x + s v) at s = 0 (length/time²): vᵀ H v with the second derivatives H of g, and
 ///   2 v · ∂²g/∂t∂x + ∂²g/∂t² if it depends on t.
 ///
-/// It is pure; where only the gap matters v is zero. The last may be left zero at the price of the correctors:
-/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and acceleration with differences.
+/// It must be pure. If only the gap is needed, v is zero. The acceleration may be returned as zero, at a loss of
+/// accuracy of the correctors: [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gradient, rate and
+/// acceleration with differences.
 ///
-/// Rows follow the contact of a step to its end. A gap that is NaN, or a gradient, fails the step
-/// ([`Error::ContactNotFinite`]), which a smaller one mends; a function that may fail otherwise is given to
+/// Rows follow the contact of a step to its end. A gap or a gradient that is NaN fails the step
+/// ([`Error::ContactNotFinite`], and a smaller step helps). For a function with other errors use
 /// [`fallible`](Self::fallible). Rows are identified by their order: (row, 0).
 ///
 /// ```
@@ -96,7 +97,7 @@ pub struct GapFunction<'a, T: Real> {
     rows: Vec<Row<'a, T>>,
     law: ContactLaw,
     scale: T,
-    /// Rows that have been linearized: all of them, or none before the first search.
+    /// Number of linearized rows: all of them, or zero before the first search.
     candidates: usize,
     /// Displacements, velocities and gradient of a row.
     buffers: [Vec<T>; 3],
@@ -109,12 +110,13 @@ impl<T: Real> std::fmt::Debug for GapFunction<'_, T> {
 }
 
 impl<'a, T: Real> GapFunction<'a, T> {
-    /// One row, a function of the displacements of these dofs.
+    /// A constraint with one row, a function of the displacements of these dofs.
     pub fn new(dofs: &[usize], mut function: impl FnMut(f64, &[T], &[T], &mut [T]) -> [T; 3] + Send + 'a) -> Self {
         Self::fallible(dofs, move |t, x, v, gradient| Ok(function(t, x, v, gradient)))
     }
 
-    /// The same with a function that may fail, for instance as [`Error::Host`]: the step fails with its error.
+    /// As [`new`](Self::new), with a function that may fail, for instance with [`Error::Host`]: the step fails with
+    /// its error.
     pub fn fallible(
         dofs: &[usize],
         function: impl FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]> + Send + 'a,
@@ -125,7 +127,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
             .and_fallible(dofs, function)
     }
 
-    /// One row more.
+    /// Adds a row.
     #[must_use]
     pub fn and(
         self,
@@ -135,7 +137,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
         self.and_fallible(dofs, move |t, x, v, gradient| Ok(function(t, x, v, gradient)))
     }
 
-    /// One row more, of a function that may fail.
+    /// Adds a row with a function that may fail.
     #[must_use]
     pub fn and_fallible(
         mut self,
@@ -152,11 +154,11 @@ impl<'a, T: Real> GapFunction<'a, T> {
         self
     }
 
-    /// Gives friction to the row that was added last: the coefficient μ, from 0, and a function for the rows along
-    /// which it slides, one in the plane, `tangents` = 2 orthonormal ones in space. It is called with t, the
-    /// displacements of the dofs of the row, and a slice for the weights of the tangents, one tangent after the other,
-    /// whose product with the velocities of the dofs is the slip; it returns the velocities of the obstacle along them
-    /// and its accelerations, zero for one at rest.
+    /// Sets friction for the last row: the coefficient μ ≥ 0, and a function for the tangential rows, of which there
+    /// are `tangents`: one in the plane, two orthonormal ones in space. The function is called with t, the
+    /// displacements of the dofs of the row, and a slice for the weights of the tangents, one tangent after the
+    /// other. The product of the weights with the velocities of the dofs is the slip. The function returns the
+    /// velocities of the obstacle along the tangents and its accelerations, zero for an obstacle at rest.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
@@ -196,15 +198,15 @@ impl<'a, T: Real> GapFunction<'a, T> {
         self
     }
 
-    /// The law of all rows; [`ContactLaw::Rigid`] by default.
+    /// Sets the law of all rows; [`ContactLaw::Rigid`] by default.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// The size of the coordinates (length) that the functions compute with: within the rounding of it gaps are zero.
-    /// None by default, and then a row that touches at the start must be given with a gap of exactly zero or more.
+    /// Sets the magnitude of the coordinates (length) used in the functions: gaps within its rounding are zero. The
+    /// default is zero; then the gap of a row that touches at the start must be exactly zero or positive.
     ///
     /// # Errors
     ///
@@ -215,7 +217,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
         Ok(self)
     }
 
-    /// Linearizes all rows at u; whether a gradient changed.
+    /// Linearizes all rows at u; returns whether a gradient changed.
     fn linearize(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs.as_slice().len())?;
         let Self { rows, buffers: [all, still, gradient], .. } = self;
@@ -226,10 +228,10 @@ impl<'a, T: Real> GapFunction<'a, T> {
                 *x = u[dof];
             }
             let gradient = &mut gradient[..entries.len()];
-            // An entry that the function does not write is not that of another row.
+            // An entry that the function does not write must not keep the value of another row.
             gradient.fill(T::nan());
             function(t, place, &still[..place.len()], gradient)?;
-            // Without a gradient the row stays as it was, and reports a gap that is NaN.
+            // Without a finite gradient the row stays, and reports a NaN gap.
             *broken = !gradient.iter().all(|x| x.is_finite());
             if *broken {
                 continue;
@@ -244,7 +246,7 @@ impl<'a, T: Real> GapFunction<'a, T> {
             weights.fill(T::nan());
             function(t, place, weights);
             for ((_, old), &mut new) in rows.iter_mut().flatten().zip(weights) {
-                // (What is no number is refused where rows are read.)
+                // Weights that are not finite are rejected where rows are read.
                 if *old != new {
                     (*old, found) = (new, Candidates::Changed);
                 }

@@ -11,7 +11,7 @@ use std::ops::Range;
 type OffsetFunction<'a, T> = Box<dyn FnMut(f64) -> [T; 3] + Send + 'a>;
 type Drag<'a, T> = Box<dyn FnMut(f64) -> [[T; 2]; 2] + Send + 'a>;
 
-/// The (dof, weight) pairs of a row that needs nothing else, and its law.
+/// The (dof, weight) pairs of a row without other data, and its law.
 pub(crate) type PlainRow<T> = (Vec<(usize, T)>, ContactLaw);
 
 /// The friction of a row.
@@ -32,7 +32,7 @@ impl<T> std::fmt::Debug for Friction<'_, T> {
     }
 }
 
-/// A row that holds both ways as long as it is pulled by no more than a force.
+/// A row that holds in both directions until its tension exceeds its strength.
 #[derive(Debug)]
 struct Bond {
     row: usize,
@@ -89,18 +89,18 @@ impl<T: Real> From<T> for GapOffset<'_, T> {
 #[derive(Debug)]
 pub struct LinearRows<'a, T: Real> {
     dofs: DofList,
-    /// In places of the list.
+    /// Dofs are places in the list.
     jacobian: ContactJacobian<T>,
     laws: Vec<ContactLaw>,
     offsets: Vec<GapOffset<'a, T>>,
-    /// Rows that hold both ways until they are pulled by more than a force, in their order.
+    /// Rows that hold in both directions until their tension exceeds their strength, in their order.
     bonds: Vec<Bond>,
-    /// In places of the list too.
+    /// Dofs are places in the list.
     tangents: ContactJacobian<T>,
     /// In the order of their rows.
     frictions: Vec<Friction<'a, T>>,
     coordinates: T,
-    /// Whether the numbers given have been looked at.
+    /// Whether the given numbers have been checked.
     checked: bool,
 }
 
@@ -111,7 +111,7 @@ impl<T: Real> Default for LinearRows<'_, T> {
 }
 
 impl<'a, T: Real> LinearRows<'a, T> {
-    /// No rows yet.
+    /// A constraint without rows.
     pub fn new() -> Self {
         let (dofs, jacobian) = (DofList::default(), ContactJacobian::default());
         let (tangents, frictions) = (ContactJacobian::default(), Vec::new());
@@ -147,8 +147,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self.row(ContactLaw::Equality, entries, offset)
     }
 
-    /// Adds a row with `G u + g0 = 0` as long as it is pulled by no more than `strength` (force), which is looked at
-    /// after each step; from then on it is a unilateral one. [`friction`](Self::friction) acts once it is broken.
+    /// Adds a row with `G u + g0 = 0` until its tension exceeds `strength` (force), which is checked after each step;
+    /// then it is unilateral. [`friction`](Self::friction) acts once it is broken.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -175,8 +175,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) +
     /// g0.
     ///
-    /// The normal has any length, as that of a [`Plane`](super::Plane): gaps are lengths, forces are forces. Where the
-    /// pair is free to slide nothing else acts on it.
+    /// The normal may have any length, as for a [`Plane`](super::Plane): it is normalized, so that gaps are lengths
+    /// and multipliers are forces. Nothing acts along the tangents.
     ///
     /// # Errors
     ///
@@ -203,7 +203,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
         Ok(self.row(law, &apart(first, second, normal), offset))
     }
 
-    /// The contact of a [`pair`](Self::pair) with friction: along one direction in the plane, two in space.
+    /// Adds the contact of a [`pair`](Self::pair) with friction: along one direction in the plane, two in space.
     ///
     /// # Errors
     ///
@@ -232,9 +232,9 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
-    /// Gives friction to the row that was added last: the coefficient μ, from 0, and the rows along which it slides, as
-    /// (dof, weight) pairs; one in the plane, two of orthonormal directions in space. Slip is their product with the
-    /// velocities. Nothing if there is no row.
+    /// Sets friction for the last row: the coefficient μ ≥ 0, and the tangential rows as (dof, weight) pairs: one in
+    /// the plane, two along orthonormal directions in space. Slip is their product with the velocities. Without a row
+    /// it does nothing.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -259,7 +259,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
     #[must_use]
     pub fn friction(mut self, coefficient: f64, tangents: &[&[(usize, T)]]) -> Self {
         let Some(row) = self.laws.len().checked_sub(1) else { return self };
-        // (Only the last one can be of the last row.)
+        // Only the last entry can belong to the last row.
         self.frictions.pop_if(|friction| friction.row == row);
         let first = self.tangents.rows();
         for entries in tangents {
@@ -271,8 +271,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
-    /// Lets the obstacle of the row that was added last move along its tangents, as a belt does: the closure returns
-    /// its velocities along them at t, and its accelerations. Nothing if the row has no [`friction`](Self::friction).
+    /// Moves the obstacle of the last row along its tangents, as a belt: the closure returns its velocities along
+    /// them at t, and its accelerations. Without [`friction`](Self::friction) of that row it does nothing.
     #[must_use]
     pub fn dragging(mut self, drag: impl FnMut(f64) -> [[T; 2]; 2] + Send + 'a) -> Self {
         let row = self.laws.len().wrapping_sub(1);
@@ -282,15 +282,15 @@ impl<'a, T: Real> LinearRows<'a, T> {
         self
     }
 
-    /// The size of the coordinates from which the host has computed the gaps (length), for all rows: gaps within their
-    /// rounding are zero. Zero by default, as if the gaps were exact.
+    /// Sets the magnitude of the coordinates from which the host has computed the gaps (length), for all rows: gaps
+    /// within their rounding are zero. The default is zero, for exact gaps.
     #[must_use]
     pub fn coordinates(mut self, size: T) -> Self {
         self.coordinates = size.abs();
         self
     }
 
-    /// Refuses numbers that are none.
+    /// Rejects numbers out of range.
     fn check(&self) -> Result<()> {
         for bond in &self.bonds {
             positive("the strength of a bond", bond.strength)?;
@@ -311,7 +311,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
         Ok(())
     }
 
-    /// The rows, if they are rigid and equality ones and nothing else.
+    /// The rows, if all of them are rigid or equality rows without other data.
     pub(crate) fn plain(&self) -> Result<Vec<PlainRow<T>>> {
         self.check()?;
         let refused = |reason| Err(Error::Incompatible { part: "the contact rows".into(), reason });
@@ -420,7 +420,7 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
         Ok(Rates::Given)
     }
 
-    /// What passes through an obstacle is never behind it: gaps are affine.
+    /// Gaps are affine, so that a node cannot pass through undetected.
     fn inspects(&self) -> bool {
         false
     }
@@ -441,7 +441,7 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn variation(&self) -> Variation {
-        // (A broken bond is another law, and may have friction.)
+        // A broken bond has another law, and may have friction.
         if self.bonds.is_empty() { Variation::Never } else { Variation::BySearch }
     }
 }

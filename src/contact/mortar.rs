@@ -87,7 +87,7 @@ const BEYOND: f64 = 0.25;
 ///   ([`Contact::recovery`](super::Contact::recovery)).
 /// - If two layers of a master lie behind each other within the reach, the slave is in contact with both.
 /// - On facets of second order that are curved, or whose nodes are not in the middle, the pressure of the patch test
-///   is not exact to rounding (`docs/contact.md`), because areas are those of the linear parts.
+///   is not exact to rounding (`docs/contact.md`), because areas are taken from the linear parts.
 /// - Gaps are measured along the normals of facets; for facets of second order along the normals of their parts.
 ///
 /// # Identity

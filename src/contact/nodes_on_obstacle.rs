@@ -1,4 +1,4 @@
-//! Nodes of a deformable body against a rigid obstacle, which may move and turn.
+//! Contact of nodes of a deformable body with a rigid obstacle, which may move and turn.
 
 mod motion;
 mod passage;
@@ -14,7 +14,7 @@ use crate::real::Real;
 use motion::{Course, Motion};
 use passage::{look_at, turns_too_far};
 
-/// A node: its number, where it is at u = 0, and the places of the dofs of its displacement.
+/// A node: its index, its position at u = 0, and the places of the dofs of its displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node<T, const D: usize> {
     number: usize,
@@ -34,27 +34,26 @@ impl<T: Real, const D: usize> Node<T, D> {
     }
 }
 
-/// Friction coefficient at a place in space.
+/// Friction coefficient at a position in space.
 type Roughness<'a, T, const D: usize> = Box<dyn Fn([T; D]) -> f64 + Send + 'a>;
 
 /// Velocity and acceleration of a point of the obstacle's surface at t.
 type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a>;
 
-/// Nodes against a rigid [`Obstacle`], one row a node: g is the signed distance of the node, G its normal. Rows are
-/// identified by (number of the node, 0).
+/// Contact of nodes with a rigid [`Obstacle`], one row per node: g is the signed distance of the node, G its normal.
+/// Rows are identified by (index of the node, 0).
 ///
-/// Rows follow the contact of a step to where it is imposed, so that on any surface gaps are distances at its end;
-/// schemes that impose contact on velocities see the tangent plane of the start of the step instead (which moves with
-/// the obstacle, and keeps its normal for the step if that turns), and on a surface of radius R that leaves a gap of up
-/// to (h v)²/(2R) a step. With a `reach` only nodes
-/// nearer than that, or than their velocity brings them within the step, are candidates, and a body farther away costs
-/// a bounding box.
+/// Rows follow the contact of a step to the time at which it is imposed, so that on any surface gaps are distances at
+/// the end of the step. Schemes that impose contact on velocities use the tangent plane at the start of the step
+/// instead. It moves with the obstacle, but if the obstacle turns, its normal is kept for the step. On a surface of
+/// radius R this leaves a gap of up to (h v)²/(2R) per step. With a `reach`, only nodes that are within it, or that
+/// reach it by their velocity within the step, are candidates, and a body farther away costs a bounding box.
 ///
-/// Steps are refused ([`Error::PassedThrough`], which a smaller step mends) in which a node goes straight through the
-/// body; presses along a normal that turns by more than 30° on its way; or is stopped along a normal that is not that
-/// of the place where it is, so that the energy lost would be wrong by more than a tenth; also steps in which the
-/// obstacle itself [turns](Self::turning) by more than 30° with a node near it. What this cannot see is a way that is
-/// not straight: a node that turns around within a step.
+/// A step is rejected ([`Error::PassedThrough`], and a smaller step helps) if a node goes straight through the body;
+/// if it presses along a normal that turns by more than 30° on its path; if it is stopped along a normal that differs
+/// from the normal at its position, so that the energy lost would be wrong by more than a tenth; or if the obstacle
+/// [turns](Self::turning) by more than 30° with a node near it. Paths count as straight: a node that turns around
+/// within a step is not detected.
 ///
 /// ```
 /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
@@ -73,7 +72,7 @@ type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + S
 pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     obstacle: Box<dyn Obstacle<T, D> + 'a>,
     dofs: DofList,
-    /// Which of them rows may act on.
+    /// For each dof whether rows may act on it.
     acts: Vec<bool>,
     nodes: Vec<Node<T, D>>,
     law: ContactLaw,
@@ -83,7 +82,7 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     roughness: Option<Roughness<'a, T, D>>,
     drag: Option<Drag<'a, T, D>>,
     rows: Vec<Row<T, D>>,
-    /// Rows of the search before.
+    /// Rows of the previous search.
     before: Vec<Row<T, D>>,
 }
 
@@ -91,15 +90,15 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row<T, const D: usize> {
     node: usize,
-    /// Where the distance is linearized, with distance and normal there, in the frame of the obstacle.
+    /// The point of linearization, with distance and normal there, in the frame of the obstacle.
     place: [T; D],
     distance: T,
     own_normal: [T; D],
     /// The normal in space.
     normal: [T; D],
-    /// The largest coordinate of the node, of which that place is what the obstacle's motion leaves.
+    /// The largest coordinate of the node, which sets the rounding of `place`.
     size: T,
-    /// Coordinates of the node where it was looked at last.
+    /// The latest coordinates of the node.
     at: [T; D],
     /// Gap and normal at the search, in the frame of the obstacle.
     start: (T, [T; D]),
@@ -107,13 +106,13 @@ struct Row<T, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Row<T, D> {
-    /// Distance of a place in the frame of the obstacle from the tangent plane.
+    /// Distance of a point in the frame of the obstacle from the tangent plane.
     fn on_tangent_plane(&self, place: [T; D]) -> T {
         self.distance + dot(self.own_normal, minus(place, self.place))
     }
 
-    /// Distance of a place in the frame of the obstacle and normal there; of a place on the other side of the obstacle
-    /// those of the tangent plane, which is not passed unseen.
+    /// Distance and normal of a point in the frame of the obstacle. For a point on the other side of the obstacle
+    /// those of the tangent plane, so that a node cannot pass through undetected.
     fn seen_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
         let (distance, normal) = obstacle.distance(place);
         match dot(normal, self.own_normal) > T::zero() {
@@ -137,7 +136,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// Rigid contact of `nodes` with an obstacle at rest.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh and `dofs` the dofs of their displacements;
-    /// `nodes` names nodes by their index there.
+    /// `nodes` lists nodes by their index there.
     ///
     /// # Errors
     ///
@@ -179,8 +178,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         Ok(contact)
     }
 
-    /// Coulomb's friction with a coefficient μ, from 0, for all nodes. Slip is the velocity of a node against the
-    /// points of the surface: those move with the obstacle ([`moving`](Self::moving), [`turning`](Self::turning)) or
+    /// Sets Coulomb's friction with a coefficient μ ≥ 0 for all nodes. Slip is the velocity of a node relative to the
+    /// points of the surface, which move with the obstacle ([`moving`](Self::moving), [`turning`](Self::turning)) or
     /// along it ([`dragging`](Self::dragging)).
     ///
     /// ```
@@ -209,7 +208,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Friction with a coefficient that depends on the place of the node in space: it is that of the start of each
+    /// Sets a friction coefficient that depends on the position of the node in space, evaluated at the start of each
     /// step.
     #[must_use]
     pub fn friction_at(mut self, coefficient: impl Fn([T; D]) -> f64 + Send + 'a) -> Self {
@@ -218,17 +217,18 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Lets the points of the surface move along it, though the obstacle stays where it is: belts, turning wheels. The
-    /// closure returns the velocity at t of the point of the obstacle that is at x (in space), and its acceleration;
-    /// those of [`moving`](Self::moving) and [`turning`](Self::turning) are added. For a wheel that turns with ω they
-    /// are ω × r and −ω² r; unlike an obstacle that turns it may turn as far as it likes in a step.
+    /// Moves the points of the surface along it while the obstacle stays at its position: belts, turning wheels. The
+    /// closure returns the velocity and the acceleration at t of the point of the obstacle at x (in space). The
+    /// motions of [`moving`](Self::moving) and [`turning`](Self::turning) are added. For a wheel that turns with ω
+    /// they are ω × r and −ω² r. In contrast to an obstacle that turns, its rotation in a step is not limited.
     #[must_use]
     pub fn dragging(mut self, drag: impl FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a) -> Self {
         self.drag = Some(Box::new(drag));
         self
     }
 
-    /// Which dofs rows may act on: with friction all, along a fixed normal those it has a part of.
+    /// Finds the dofs on which rows may act: all with friction; for a fixed normal those along its nonzero
+    /// components.
     fn settle_acting(&mut self) {
         let normal = self.fixed_normal();
         let rubs = self.roughness.is_some() || self.friction != 0.0;
@@ -240,19 +240,19 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         }
     }
 
-    /// The law of all rows; [`ContactLaw::Rigid`] by default.
+    /// Sets the law of all rows; [`ContactLaw::Rigid`] by default.
     #[must_use]
     pub fn with_law(mut self, law: ContactLaw) -> Self {
         self.law = law;
         self
     }
 
-    /// Nodes farther away than this (length) are no candidates, unless their velocity brings them as near as that
-    /// within the step; by default all are. It saves the cost of rows that stay open.
+    /// Sets the distance (length) beyond which nodes are not candidates, unless their velocity brings them within it
+    /// in the step; by default all nodes are candidates. It saves the cost of rows that stay open.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless it is positive and finite.
+    /// [`Error::Parameter`] unless positive and finite.
     pub fn reach(mut self, reach: T) -> Result<Self> {
         positive("the reach of the contact", reach.value())?;
         self.reach = reach;
@@ -268,8 +268,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self
     }
 
-    /// Moves and turns the obstacle: the closure returns its [`RigidMotion`] at t. In its own frame the obstacle stands
-    /// still, so that any [`Obstacle`] turns.
+    /// Moves and turns the obstacle: the closure returns its [`RigidMotion`] at t. In its own frame the obstacle is
+    /// at rest, so that any [`Obstacle`] can turn.
     ///
     /// With the motion x = c + R y of its points, r = x − c, and ω × r the velocity of turning, the gap of a node at x
     /// is the distance d at y = Rᵀ(x − c), its normal n = R ∇d, and
@@ -279,12 +279,12 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// g̈ = n · (a − a_c − ω̇ × r − ω × (ω × r) − 2 ω × w) + ẏᵀ (∇²d) ẏ,   w = v − v_c − ω × r,  ẏ = Rᵀ w
     /// ```
     ///
-    /// A plane that turns is a curved surface: its rows follow. Steps in which the obstacle turns by more than 30° are
-    /// refused ([`Error::PassedThrough`]) while a node is nearer than its way, as seen from the obstacle, also of a
-    /// ball that turns about its center; what turns fast without changing its shape in space is better
-    /// [dragged](Self::dragging). Rates that are zero though gaps move are refused ([`Error::SilentMotion`]), other
-    /// wrong ones are not: [`verify::gap_jacobian`](crate::verify::gap_jacobian) finds them. A closure that returns no
-    /// rotation fails what asked for it with [`Error::Parameter`] or [`Error::NotFinite`].
+    /// A plane that turns is treated as a curved surface: its rows follow. A step in which the obstacle turns by more
+    /// than 30° is rejected ([`Error::PassedThrough`]) if a node is nearer than its path as seen from the obstacle,
+    /// even for a ball that turns about its center. For obstacles that turn fast without changing their shape in
+    /// space use [`dragging`](Self::dragging). Rates that are zero while gaps change are rejected
+    /// ([`Error::SilentMotion`]); [`verify::gap_jacobian`](crate::verify::gap_jacobian) finds other wrong rates. A
+    /// closure that does not return a rotation causes [`Error::Parameter`] or [`Error::NotFinite`].
     ///
     /// ```
     /// use contact_dynamics::contact::{NodesOnObstacle, Plane, RigidMotion};
@@ -321,8 +321,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         self.obstacle.fixed_normal().filter(|_| !self.motion.turns())
     }
 
-    /// Whether no node can be within reach: the box around all nodes is farther away than its own half diagonal, and
-    /// than the longest way that a node makes against the obstacle in the time `ahead`.
+    /// Whether no node can be within reach: the center of the box around all nodes is farther away than its half
+    /// diagonal plus the reach plus the longest path of a node relative to the obstacle in the time `ahead`.
     fn is_far(&self, u: &[T], v: &[T], course: &Course<T, D>, ahead: T) -> bool {
         if self.reach.is_infinite() {
             return false;
@@ -349,7 +349,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         self.dofs.as_slice()
     }
 
-    /// Across an axis-aligned normal that is fixed nodes do not act.
+    /// Nodes do not act on the axes across a fixed normal along an axis.
     fn only_reads(&self, place: usize) -> bool {
         !self.acts[place]
     }
@@ -397,7 +397,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                 let (place, size) = (now.to_own(x), x.iter().fold(T::zero(), size));
                 let (distance, normal) = self.obstacle.distance(place);
                 let near = || distance <= self.reach + course.square(x, node.of(v).map(|v| ahead * v)).sqrt();
-                // NaN stays, to be reported as a gap.
+                // NaN is kept, to be reported as a gap.
                 if distance <= self.reach || distance.is_nan() || near() {
                     self.rows.push(Row {
                         node: index,
@@ -414,7 +414,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             }
         }
         let same = |(new, old): (&Row<T, D>, &Row<T, D>)| {
-            // (A coefficient that is NaN is refused when it is read.)
+            // A NaN coefficient is rejected when it is read.
             new.node == old.node && new.normal == old.normal && new.friction.to_bits() == old.friction.to_bits()
         };
         let kept = self.rows.len() == self.before.len() && self.rows.iter().zip(&self.before).all(same);
@@ -449,7 +449,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         for row in &mut self.rows {
             row.at = self.nodes[row.node].at(step.u[1]);
         }
-        // Through a plane a row lets nothing pass.
+        // A node with a row cannot pass through a plane.
         if self.reach.is_infinite() && self.fixed_normal().is_some() {
             return Ok(());
         }
@@ -463,7 +463,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             let ends = [from.to_own(places[0]), to.to_own(places[1])];
             let way = minus(ends[1], ends[0]);
             let length = dot(way, way).sqrt() + course.bend(places[0], minus(places[1], places[0]));
-            // What is no candidate was farther away than the reach.
+            // A node without a row was farther away than the reach.
             let start = row.map_or(*reach, |(_, row)| row.start.0);
             if start > length {
                 continue;
@@ -486,7 +486,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         for (row, gap) in self.rows.iter().zip(gaps) {
             let place = now.to_own(self.nodes[row.node].at(u));
             *gap = match (flat, turns) {
-                // The distance itself is affine, and the same to the bit whenever the last search was.
+                // The distance itself is affine. It is bitwise the same for any time of the last search.
                 (true, _) => self.obstacle.distance(place).0,
                 (false, true) => row.seen_from(&*self.obstacle, place).0,
                 (false, false) => row.on_tangent_plane(place),
@@ -506,7 +506,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             let (place, velocity) = (now.to_own(x), now.velocity_at(x));
             let mut rate = -dot(row.normal, velocity);
             if turns {
-                // Elsewhere than where rows are linearized the gap has another normal: what ġ has besides G v.
+                // Away from the point of linearization the gap has another normal, which adds to ġ besides G v.
                 let normal = now.direction(row.seen_from(&*self.obstacle, place).1);
                 rate += dot(minus(normal, row.normal), minus(v, velocity));
             }
@@ -547,7 +547,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
     }
 }
 
-/// A vector with the axes that it does not have.
+/// A vector in space; missing axes are zero.
 fn in_space<T: Real, const D: usize>(x: [T; D]) -> [T; 3] {
     std::array::from_fn(|axis| x.get(axis).copied().unwrap_or(T::zero()))
 }

@@ -18,7 +18,7 @@ use crate::real::Real;
 /// A rigid body, given by the signed distance of a point from its surface: positive outside, negative inside.
 ///
 /// Evaluations are pure. The gradient of a signed distance is the outward unit normal at the nearest point of the
-/// surface. The obstacle stands still in its own frame; [`NodesOnObstacle`](super::NodesOnObstacle) moves it.
+/// surface. The obstacle is at rest in its own frame; [`NodesOnObstacle`](super::NodesOnObstacle) moves it.
 ///
 /// ```
 /// use contact_dynamics::contact::Obstacle;
@@ -40,8 +40,8 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
     /// Signed distance of x (length) and its gradient, the unit normal.
     fn distance(&self, x: [T; D]) -> (T, [T; D]);
 
-    /// wᵀ H w with H the second derivative of the distance: the acceleration of the gap that comes from moving with
-    /// velocity w along a curved surface. Default: none, as on flat surfaces.
+    /// wᵀ H w with H the second derivative of the distance: the acceleration of the gap by a motion with velocity w
+    /// along a curved surface. Default: zero, for flat surfaces.
     fn curvature(&self, x: [T; D], w: [T; D]) -> T {
         let _ = (x, w);
         T::zero()
@@ -52,30 +52,30 @@ pub trait Obstacle<T: Real, const D: usize>: Send {
         None
     }
 
-    /// The largest length from which a distance is left when it is computed (length), for instance a radius: gaps
-    /// within its rounding are zero. Default: none but the coordinates of the point.
+    /// The largest length, for instance a radius, that is subtracted in the computation of a distance (length): gaps
+    /// within its rounding are zero. Default: zero, so that only the coordinates of the point count.
     fn magnitude(&self) -> T {
         T::zero()
     }
 
-    /// Where a straight way goes into the body and turns outward again, if it does: what moves so in one step has
-    /// missed a contact. Default: found by going along the way in steps that the distance allows, but no shorter than
-    /// 1/16 of it; hollows and crests smaller than that may be missed.
+    /// The passage of a straight path that goes into the body and turns outward again, if it does: such a motion in
+    /// one step has missed a contact. Default: found by marching along the path in increments of the distance, at
+    /// least 1/16 of the path; smaller hollows and crests may be missed.
     fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
         trace(|x| self.distance(x), from, minus(to, from))
     }
 }
 
-/// How a straight way goes through a body.
+/// The passage of a straight path through a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage<T> {
     /// The depth of its deepest point (length).
     pub depth: T,
-    /// Cosine of the angle between the way and the inward normal where it enters, or starts.
+    /// Cosine of the angle between the path and the inward normal where it enters, or starts.
     pub steepness: T,
 }
 
-/// The first passage of a way through a body of any shape.
+/// The first passage of a path through a body of any shape.
 fn trace<T: Real, const D: usize>(
     distance: impl Fn([T; D]) -> (T, [T; D]),
     from: [T; D],
@@ -91,7 +91,7 @@ fn trace<T: Real, const D: usize>(
         let next = (s + (gap / length).max(T::of(SHORTEST))).min(T::one());
         let (next_gap, next_normal) = at(next);
         if dot(normal, way) < T::zero() && dot(next_normal, way) > T::zero() {
-            // The deepest point lies between.
+            // The deepest point is in between.
             let (mut down, mut up) = (s, next);
             for _ in 0..HALVINGS {
                 let middle = half * (down + up);
@@ -118,8 +118,8 @@ fn trace<T: Real, const D: usize>(
     None
 }
 
-/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are across its axis;
-/// `length` is that of the whole way.
+/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are projected across its
+/// axis; `length` is the length of the whole path.
 fn through_round<T: Real, const D: usize>(
     from: [T; D],
     way: [T; D],
@@ -128,7 +128,7 @@ fn through_round<T: Real, const D: usize>(
     side: Side,
 ) -> Option<Passage<T>> {
     let (square, along) = (dot(way, way), -dot(from, way));
-    // From inside of a hollow body no straight way comes back. Elsewhere the deepest point must lie between the ends.
+    // In a hollow body no straight path returns inside. In other bodies the deepest point must be between the ends.
     if side == Side::Inside || !(along > T::zero() && along < square) {
         return None;
     }
@@ -136,7 +136,8 @@ fn through_round<T: Real, const D: usize>(
     let deepest: [T; D] = std::array::from_fn(|k| from[k] + share * way[k]);
     let nearest = dot(deepest, deepest).sqrt();
     let start = dot(from, from).sqrt();
-    // Where it enters, the distance from the middle is the radius, or that of a start inside.
+    // Where the path enters, its distance from the center is the radius; if it starts inside, the distance of the
+    // start.
     let entry = start.min(radius);
     let sine = (nearest / entry).min(T::one());
     let steepness = (T::one() - sine * sine).sqrt() * square.sqrt() / length;
@@ -158,7 +159,7 @@ pub struct Plane<T, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Plane<T, D> {
-    /// Through a point, with a normal of any length that points to where bodies may be.
+    /// Through a point, with a normal of any length that points to the free side.
     ///
     /// # Errors
     ///
@@ -183,7 +184,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Plane<T, D> {
     }
 }
 
-/// Which side of a closed surface bodies may be on.
+/// The side of a closed surface on which bodies may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Outside of a solid obstacle.
@@ -278,7 +279,7 @@ impl<T: Real> Cylinder<T> {
         Ok(Self { point, axis: unit("the axis of the cylinder", axis)?, radius, side })
     }
 
-    /// The part across the axis.
+    /// The component across the axis.
     fn across(&self, x: [T; 3]) -> [T; 3] {
         let along = dot(x, self.axis);
         std::array::from_fn(|k| x[k] - along * self.axis[k])
@@ -305,7 +306,8 @@ impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
     }
 }
 
-/// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is right.
+/// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is
+/// valid.
 fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D]) {
     let (length, sign) = (length(r), side.sign::<T>());
     let normal = match length > T::zero() {
@@ -315,11 +317,11 @@ fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D
     (sign * (length - radius), normal)
 }
 
-/// wᵀ H w of a round surface: the speed along it squared over the distance from its center or axis.
+/// wᵀ H w of a round surface: the square of the speed along it divided by the distance from its center or axis.
 fn round_curvature<T: Real, const D: usize>(r: [T; D], w: [T; D], side: Side) -> T {
     let square = dot(r, r);
     if !is_safe(square) {
-        // In units of the lengths: w can be as far out of range as r is.
+        // In units of the lengths, because w can be as far out of range as r.
         let (distance, speed) = (length(r), length(w));
         if distance == T::zero() || speed == T::zero() {
             return T::zero();
@@ -331,12 +333,12 @@ fn round_curvature<T: Real, const D: usize>(r: [T; D], w: [T; D], side: Side) ->
     side.sign::<T>() * (dot(w, w) - along * along / square) / square.sqrt()
 }
 
-/// Whether a sum of squares has lost nothing to the range of the scalar.
+/// Whether a sum of squares has neither overflowed nor underflowed.
 fn is_safe<T: Real>(square: T) -> bool {
     square.is_finite() && square > T::min_positive_value() / T::epsilon()
 }
 
-/// |x|, also where its square leaves the range of the scalar.
+/// |x|, also if its square overflows or underflows.
 fn length<T: Real, const D: usize>(x: [T; D]) -> T {
     let square = dot(x, x);
     if is_safe(square) {
@@ -372,16 +374,16 @@ pub(super) fn dot<T: Real, const D: usize>(x: [T; D], y: [T; D]) -> T {
     x.into_iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Orthonormal directions across a unit normal: one in the plane, two in space (others are zero). Across an axis they
-/// are axes.
+/// Orthonormal tangents to a unit normal: one in the plane, two in space (others are zero). For a normal along an
+/// axis they are axes.
 pub(super) fn across<T: Real, const D: usize>(normal: [T; D]) -> [[T; D]; 2] {
     let mut directions = [[T::zero(); D]; 2];
     if D == 2 {
         (directions[0][0], directions[0][1]) = (normal[1], -normal[0]);
     } else if D == 3 {
-        // From the first axis that is far from the normal, as one of three is; how far no symmetric place decides.
-        // (Directions must not jump between two axes while a normal is iterated for: not from the one that is farthest,
-        // which of a flat surface rounding would choose.)
+        // The first axis at a sufficient angle from the normal; one of three always has it. The limit is not reached
+        // at a symmetric position. The axis at the largest angle would be a bad choice: on a flat surface rounding
+        // would decide which one it is, and the tangents would jump while a normal is iterated.
         let axis = (0..D).find(|&axis| normal[axis].abs() < T::of(0.61)).unwrap_or(0);
         let mut first: [T; D] = std::array::from_fn(|k| -normal[axis] * normal[k]);
         first[axis] += T::one();
@@ -404,7 +406,7 @@ fn finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     }
 }
 
-/// `x / |x|`; vectors that are zero or not finite are refused under the name given.
+/// `x / |x|`; vectors that are zero or not finite are rejected under the given name.
 pub(super) fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Result<[T; D]> {
     finite(name, &x)?;
     if x.iter().all(|x| *x == T::zero()) {
@@ -415,7 +417,7 @@ pub(super) fn unit<T: Real, const D: usize>(name: &'static str, x: [T; D]) -> Re
 
 /// `x / |x|`, NaN if x is zero or not finite.
 pub(super) fn unit_or_nan<T: Real, const D: usize>(x: [T; D]) -> [T; D] {
-    // Scaled first: squares of very small or large entries leave the range of the scalar.
+    // Scaled first, because squares of very small or large entries underflow or overflow.
     let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
     let scaled = x.map(|x| x / largest);
     let length = dot(scaled, scaled).sqrt();
@@ -426,7 +428,7 @@ pub(super) fn unit_or_nan<T: Real, const D: usize>(x: [T; D]) -> [T; D] {
 mod tests {
     use super::across;
 
-    /// Rounding of a flat surface's normal turns its tangents by rounding.
+    /// Rounding of a flat surface's normal changes its tangents only by rounding.
     #[test]
     fn directions_do_not_jump_where_a_normal_is_rounded() {
         let near = |x: [f64; 3], y: [f64; 3]| x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-12);

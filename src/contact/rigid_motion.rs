@@ -4,15 +4,15 @@ use super::obstacle::{dot, minus, unit_or_nan};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Where a rigid body is at an instant, how it moves and how that changes.
+/// The position, velocity and acceleration of a rigid body at an instant.
 ///
-/// A point y of the body in its own frame is in space at x = c + R y, with R a rotation and c where the origin of the
-/// body's frame is. With r = x − c and the angular velocity ω the point has the velocity v_c + ω × r and the
-/// acceleration a_c + ω̇ × r + ω × (ω × r). Angles are in radians, counter-clockwise in the plane and by the right-hand
-/// rule in space; ω and ω̇ are vectors in space, not in the frame of the body.
+/// A point y of the body in its own frame has the position x = c + R y in space, with a rotation R and the position c
+/// of the origin of the body's frame. With r = x − c and the angular velocity ω the point has the velocity v_c + ω ×
+/// r and the acceleration a_c + ω̇ × r + ω × (ω × r). Angles are in radians, counter-clockwise in the plane and by
+/// the right-hand rule in space. ω and ω̇ are vectors in space, not in the frame of the body.
 ///
-/// All that is given must belong to the same motion: ω is the rate of R, ω̇ that of ω.
-/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) compares gap rates, and so these, with differences.
+/// All values must belong to the same motion: ω is the rate of R, ω̇ is the rate of ω.
+/// [`verify::gap_jacobian`](crate::verify::gap_jacobian) checks them by comparing gap rates with differences.
 ///
 /// ```
 /// use contact_dynamics::contact::RigidMotion;
@@ -31,9 +31,9 @@ use crate::real::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidMotion<T, const D: usize> {
-    /// Where the origin of the body's frame is, with its velocity and its acceleration.
+    /// The position of the origin of the body's frame, its velocity and its acceleration.
     origin: [[T; D]; 3],
-    /// None of a body that is only shifted: nothing is multiplied then.
+    /// None for a pure translation, which saves the products.
     turn: Option<Turn<T, D>>,
 }
 
@@ -63,7 +63,7 @@ fn skew<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
     [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
 }
 
-/// Only shifted, from (displacement, velocity, acceleration).
+/// A translation, from (displacement, velocity, acceleration).
 impl<T: Real, const D: usize> From<[[T; D]; 3]> for RigidMotion<T, D> {
     fn from(translation: [[T; D]; 3]) -> Self {
         Self { origin: translation, turn: None }
@@ -71,7 +71,7 @@ impl<T: Real, const D: usize> From<[[T; D]; 3]> for RigidMotion<T, D> {
 }
 
 impl<T: Real> RigidMotion<T, 2> {
-    /// Turns about a point that stays where it is, by an angle with its first and second derivative in time.
+    /// Rotation about a fixed point, by an angle with its first and second time derivative.
     ///
     /// ```
     /// use contact_dynamics::contact::RigidMotion;
@@ -90,9 +90,8 @@ impl<T: Real> RigidMotion<T, 2> {
 }
 
 impl<T: Real> RigidMotion<T, 3> {
-    /// Turns about an axis, of any length, through a point; both stay where they are. The angle comes with its first
-    /// and second derivative in time. (About an axis that is zero there is no turning: the rotation is NaN, and refused
-    /// as such.)
+    /// Rotation about a fixed axis, of any length, through a fixed point. The angle comes with its first and second
+    /// time derivative. For an axis of length zero the rotation is NaN, which is rejected.
     ///
     /// ```
     /// use contact_dynamics::contact::RigidMotion;
@@ -114,10 +113,10 @@ impl<T: Real> RigidMotion<T, 3> {
         Self::rotation(point, rotation, axis.map(|n| velocity * n), axis.map(|n| acceleration * n))
     }
 
-    /// Turns about a point that stays where it is, in any way: a rotation by its rows (what was at p + y is at p + R
-    /// y), the angular velocity and the angular acceleration as vectors in space.
+    /// Any rotation about a fixed point: the rotation matrix by rows (p + y moves to p + R y), the angular velocity
+    /// and the angular acceleration as vectors in space.
     ///
-    /// The matrix must be orthonormal within √ε and no reflection; that is looked at where the motion is used.
+    /// The matrix must be orthonormal within √ε and not a reflection; this is checked where the motion is used.
     ///
     /// ```
     /// use contact_dynamics::contact::RigidMotion;
@@ -139,7 +138,7 @@ impl<T: Real> RigidMotion<T, 3> {
 }
 
 impl<T: Real, const D: usize> RigidMotion<T, D> {
-    /// The origin of the body turns about the point as all of the body does.
+    /// A rotation about a point, from the rotation matrix and its rates.
     fn turned_about(point: [T; D], turn: Turn<T, D>) -> Self {
         let arm = product(&turn.rotation, point);
         let velocity = product(&turn.spin, arm);
@@ -148,8 +147,8 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         Self { origin, turn: Some(turn) }
     }
 
-    /// The same, shifted on top of it: (displacement, velocity, acceleration), in space. A point about which the body
-    /// turns moves so.
+    /// Adds a translation in space: (displacement, velocity, acceleration). A point about which the body turns then
+    /// moves by it.
     #[must_use]
     pub fn translated(mut self, translation: [[T; D]; 3]) -> Self {
         for (own, added) in self.origin.iter_mut().zip(translation) {
@@ -158,12 +157,12 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         self
     }
 
-    /// Where in space a point of the body is, from its place in the frame of the body.
+    /// The position in space of a point of the body, from its position in the frame of the body.
     pub fn to_space(&self, y: [T; D]) -> [T; D] {
         plus(self.origin[0], self.direction(y))
     }
 
-    /// The place in the frame of the body of what is at x in space.
+    /// The position in the frame of the body of a point at x in space.
     pub fn to_own(&self, x: [T; D]) -> [T; D] {
         self.own_direction(minus(x, self.origin[0]))
     }
@@ -200,13 +199,13 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         self.turn.as_ref().map_or(n, |turn| transposed_product(&turn.rotation, n))
     }
 
-    /// The velocity that the body sees of something at x with velocity v, in its frame: ẏ = Rᵀ (v − v_c − ω × r).
+    /// The velocity, in the body's frame, of a point at x with velocity v: ẏ = Rᵀ (v − v_c − ω × r).
     pub(super) fn own_velocity(&self, x: [T; D], v: [T; D]) -> [T; D] {
         self.own_direction(minus(v, self.velocity_at(x)))
     }
 
-    /// What must be taken from the acceleration a of something at x with velocity v for that which the body sees, in
-    /// space: R ÿ = a − b with b = a_c + ω̇ × r + ω × (ω × r) + 2 ω × (v − v_c − ω × r).
+    /// The difference between the acceleration a, in space, of a point at x with velocity v, and its acceleration
+    /// relative to the body: R ÿ = a − b with b = a_c + ω̇ × r + ω × (ω × r) + 2 ω × (v − v_c − ω × r).
     pub(super) fn apparent_acceleration(&self, x: [T; D], v: [T; D]) -> [T; D] {
         let acceleration = self.acceleration_at(x);
         match &self.turn {
@@ -218,8 +217,8 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         }
     }
 
-    /// The angle by which the body turns from here to `later`, after a time h: by the two rotations, or at the rate of
-    /// either end, whichever is most.
+    /// The angle by which the body turns from here to `later`, after a time h: from the two rotations, or from the
+    /// rate at either end, whichever is largest.
     pub(super) fn angle_to(&self, later: &Self, h: T) -> T {
         let (Some(from), Some(to)) = (&self.turn, &later.turn) else { return T::zero() };
         let (half, spare) = (T::of(0.5), T::of(D as f64 - 2.0));
@@ -229,9 +228,9 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         turned.max(h * rate(&from.spin)).max(h * rate(&to.spin))
     }
 
-    /// Up to how far from the straight line between its ends the way leads, in the frame of a body that turns by
-    /// `angle`, of something that goes straight in space: from x, by `way` against the body's origin, in a time h. R ÿ
-    /// is −a_c − ω × (ω × r) − 2 ω × w, and an eighth of h² ÿ lies between a line and its chord.
+    /// A bound of the distance of a path from the straight line between its ends, in the frame of a body that turns
+    /// by `angle`. The path is straight in space: from x, by `way` relative to the body's origin, in a time h. R ÿ is
+    /// −a_c − ω × (ω × r) − 2 ω × w, and the distance of a curve from its chord is at most h² ÿ/8.
     pub(super) fn bend(&self, x: [T; D], way: [T; D], angle: T, h: T) -> T {
         if self.turn.is_none() {
             return T::zero();
@@ -247,7 +246,7 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
         self.origin[0]
     }
 
-    /// Refuses a rotation that is none.
+    /// Rejects a matrix that is not a rotation.
     pub(super) fn check(&self) -> Result<()> {
         let Some(Turn { rotation, .. }) = &self.turn else { return Ok(()) };
         if let Some(index) = rotation.iter().flatten().position(|x| !x.is_finite()) {
@@ -268,7 +267,7 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
                 range: "at most √ε: give an orthonormal matrix",
             });
         }
-        // (In the plane rotations are made here.)
+        // In the plane this type makes all rotations itself.
         if D == 3 {
             let [a, b] = [rotation[0], rotation[1]];
             let normal: [T; D] =

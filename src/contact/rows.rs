@@ -1,4 +1,4 @@
-//! What contact knows of the gaps between two searches: the rows of G, and the rates that do not come from them.
+//! Gaps between two searches: the rows of G, and the rates that do not come from them.
 
 use super::share_of_rounding;
 use crate::real::Real;
@@ -14,7 +14,7 @@ pub struct GapRates<T> {
 }
 
 impl<T: Real> GapRates<T> {
-    /// The rates of slip along the tangents of an obstacle with those velocities and accelerations along them.
+    /// The rates of slip along the tangents of an obstacle with these velocities and accelerations along them.
     pub(super) fn dragged([velocities, accelerations]: [[T; 2]; 2]) -> [Self; 2] {
         std::array::from_fn(|k| Self { rate: -velocities[k], acceleration: -accelerations[k] })
     }
@@ -33,15 +33,16 @@ pub struct ContactJacobian<T> {
     pub(super) pointers: Vec<usize>,
     pub(super) dofs: Vec<usize>,
     pub(super) weights: Vec<T>,
-    /// For each entry the place of its dof on the interface, once it is known; `NO_RESPONSE` on prescribed dofs.
+    /// For each entry the place of its dof on the interface, after [`locate`](Self::locate); `NO_RESPONSE` for
+    /// prescribed dofs.
     places: Vec<usize>,
-    /// The largest Σ |weight| of a row, once places are known.
+    /// The largest Σ |weight| of a row, after [`locate`](Self::locate).
     largest: Option<T>,
-    /// The number of normal rows, if tangential ones stand behind them.
+    /// The number of normal rows, if tangential rows follow them.
     normals: Option<usize>,
 }
 
-/// The place of dofs that are no part of the interface.
+/// The place of dofs that are not on the interface.
 pub(crate) const NO_RESPONSE: usize = usize::MAX;
 
 impl<T> Default for ContactJacobian<T> {
@@ -74,17 +75,17 @@ impl<T: Real> ContactJacobian<T> {
         Self { pointers, dofs, weights: Vec::with_capacity(entries), places, largest: None, normals: None }
     }
 
-    /// Says that the rows so far are normal ones, and that tangential ones follow.
+    /// Marks the rows so far as normal rows; tangential rows follow.
     pub(crate) fn end_normals(&mut self) {
         self.normals = Some(self.rows());
     }
 
-    /// Whether a row is tangential: one of the contact before it, wherever rows of contacts with friction are listed.
+    /// Whether a row is tangential. In lists of rows with friction it belongs to the contact before it.
     pub(crate) fn is_tangential(&self, row: usize) -> bool {
         self.normals.is_some_and(|normals| row >= normals)
     }
 
-    /// Looks up where the dofs are on the interface: `places` has one entry a dof of the system.
+    /// Stores the places of the dofs on the interface; `places` has one entry per dof of the system.
     pub(crate) fn locate(&mut self, places: &[usize]) {
         self.places.clear();
         self.places.extend(self.dofs.iter().map(|&dof| places[dof]));
@@ -92,7 +93,7 @@ impl<T: Real> ContactJacobian<T> {
         self.largest = (0..self.rows()).map(sum).reduce(T::max);
     }
 
-    /// The largest Σ |weight| of a row: no product of a row is larger than this times the largest |x|.
+    /// The largest Σ |weight| of a row: a product of a row is at most this times the largest |x|.
     pub(crate) fn largest_row(&self) -> T {
         self.largest.unwrap_or(T::zero())
     }
@@ -110,7 +111,7 @@ impl<T: Real> ContactJacobian<T> {
         self.pointers.push(self.dofs.len());
     }
 
-    /// Becomes a copy of another one, in the memory there is.
+    /// Copies another matrix into the existing memory.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.pointers.clone_from(&other.pointers);
         self.dofs.clone_from(&other.dofs);
@@ -120,7 +121,7 @@ impl<T: Real> ContactJacobian<T> {
         self.normals = other.normals;
     }
 
-    /// Appends a row of another one.
+    /// Appends a row of another matrix.
     pub(crate) fn push_row(&mut self, other: &Self, row: usize) {
         let range = other.pointers[row]..other.pointers[row + 1];
         self.dofs.extend_from_slice(&other.dofs[range.clone()]);
@@ -128,7 +129,7 @@ impl<T: Real> ContactJacobian<T> {
         self.pointers.push(self.dofs.len());
     }
 
-    /// Appends the rows of another one, in which dofs are named by their place in a list.
+    /// Appends the rows of another matrix, whose dofs are places in `list`.
     pub(crate) fn append(&mut self, other: &Self, list: &[usize]) {
         let before = self.dofs.len();
         self.dofs.extend(other.dofs.iter().map(|&place| list[place]));
@@ -136,7 +137,7 @@ impl<T: Real> ContactJacobian<T> {
         self.pointers.extend(other.pointers[1..].iter().map(|end| before + end));
     }
 
-    /// Appends some rows of another one, in which dofs are named by their place in a list.
+    /// Appends some rows of another matrix, whose dofs are places in `list`.
     pub(crate) fn append_rows(&mut self, (other, rows): (&Self, Range<usize>), list: &[usize]) {
         for row in rows {
             self.push_entries(other.row(row).map(|(place, weight)| (list[place], weight)));
@@ -154,7 +155,7 @@ impl<T: Real> ContactJacobian<T> {
         self.dofs[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
     }
 
-    /// Whether two rows are multiples of each other but for a share of rounding: one contact, written twice.
+    /// Whether two rows are multiples of each other up to rounding: the same contact, listed twice.
     pub(crate) fn are_multiples(&self, row: usize, other: usize) -> bool {
         let largest = |row| self.row(row).map(|(_, weight)| weight.abs()).fold(T::zero(), T::max);
         let (own, size, near) = (largest(row), largest(other), share_of_rounding::<T>());
@@ -167,7 +168,7 @@ impl<T: Real> ContactJacobian<T> {
         self.row(row).map(|(dof, weight)| weight * x[dof]).sum()
     }
 
-    /// Σ_j G_row,j F_other,j with a row of another list.
+    /// Σ_j G_row,j F_other,j with a row of another matrix.
     pub(crate) fn dot(&self, row: usize, (others, other): (&Self, usize)) -> T {
         let of_other = |dof: usize| others.row(other).filter(move |&(at, _)| at == dof);
         self.row(row).flat_map(|(dof, weight)| of_other(dof).map(move |(_, other)| weight * other)).sum()
@@ -215,20 +216,20 @@ impl<T: Real> ContactJacobian<T> {
     }
 }
 
-/// A row of G spread out over dofs: its products with other rows then cost what those have of entries.
+/// A row of G as a dense vector: its product with another row costs only the entries of that row.
 #[derive(Debug, Default)]
 pub(crate) struct SpreadRow<T> {
-    /// Zero between two uses.
+    /// Zero outside of `of`.
     weights: Vec<T>,
 }
 
 impl<T: Real> SpreadRow<T> {
-    /// Of rows on so many dofs.
+    /// For rows on this number of dofs.
     pub(crate) fn new(dofs: usize) -> Self {
         Self { weights: vec![T::zero(); dofs] }
     }
 
-    /// Makes room for rows on so many dofs.
+    /// Grows to rows on this number of dofs.
     pub(crate) fn reserve(&mut self, dofs: usize) {
         self.weights.resize(dofs.max(self.weights.len()), T::zero());
     }

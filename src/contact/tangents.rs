@@ -1,13 +1,13 @@
-//! Which rows of G are those of friction: tangential rows stand behind all normal ones, in the order of their contacts.
+//! The tangential rows of G, for friction: they follow all normal rows, in the order of their contacts.
 
 use super::ContactJacobian;
 use crate::real::Real;
 use std::ops::Range;
 
-/// The tangential rows of the contacts of a run that have friction. Nothing is stored where none has.
+/// The tangential rows of the contacts of a run that have friction. Nothing is stored if none has.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Tangents {
-    /// For each contact its first tangential row, and behind the last contact the end of all; empty without friction.
+    /// For each contact its first tangential row, and after the last contact the end of all; empty without friction.
     first: Vec<usize>,
     /// For each contact its friction coefficient.
     friction: Vec<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct Tangents {
 }
 
 impl Tangents {
-    /// No contact.
+    /// Removes all contacts.
     pub(crate) fn clear(&mut self) {
         self.first.clear();
         self.friction.clear();
@@ -25,7 +25,7 @@ impl Tangents {
         self.contacts = 0;
     }
 
-    /// Becomes a copy of another one, in the memory there is.
+    /// Copies another list into the existing memory.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.first.clone_from(&other.first);
         self.friction.clone_from(&other.friction);
@@ -33,14 +33,14 @@ impl Tangents {
         self.contacts = other.contacts;
     }
 
-    /// Begins the list of so many contacts, some of which have friction.
+    /// Starts a list for this number of contacts, some of which have friction.
     pub(crate) fn begin(&mut self, contacts: usize) {
         self.clear();
         self.contacts = contacts;
         self.first.push(contacts);
     }
 
-    /// Appends the next contact, with so many tangential rows.
+    /// Appends the next contact, with this number of tangential rows.
     pub(crate) fn push(&mut self, friction: f64, rows: usize) {
         let contact = self.friction.len();
         self.friction.push(friction);
@@ -86,22 +86,22 @@ impl Tangents {
         (0..self.friction.len()).filter(|&contact| !self.of(contact).is_empty())
     }
 
-    /// Whether a contact acts on any of the dofs given (ascending), by its gap or by its friction.
+    /// Whether a contact acts on any of the given dofs (ascending), by its gap or by its friction.
     pub(crate) fn act_on<T: Real>(&self, g: &ContactJacobian<T>, contact: usize, dofs: &[usize]) -> bool {
         !dofs.is_empty() && (g.acts_on(contact, dofs) || self.rub_on(g, contact, dofs))
     }
 
-    /// Whether the friction of a contact acts on any of the dofs given (ascending).
+    /// Whether the friction of a contact acts on any of the given dofs (ascending).
     pub(crate) fn rub_on<T: Real>(&self, g: &ContactJacobian<T>, contact: usize, dofs: &[usize]) -> bool {
         self.of(contact).any(|row| g.acts_on(row, dofs))
     }
 
-    /// The contact that a row belongs to: that of a gap is its own.
+    /// The contact of a row; a normal row is its own contact.
     pub(crate) fn owner(&self, row: usize) -> usize {
         row.checked_sub(self.contacts).and_then(|tangent| self.owners.get(tangent)).copied().unwrap_or(row)
     }
 
-    /// Appends contacts to a list of rows, each with the rows of its friction behind it.
+    /// Appends contacts to a list of rows, each followed by its tangential rows.
     pub(crate) fn expand(&self, contacts: impl Iterator<Item = usize>, rows: &mut Vec<usize>) {
         match self.is_empty() {
             true => rows.extend(contacts),
@@ -112,12 +112,12 @@ impl Tangents {
         }
     }
 
-    /// Turns values of the tangential rows with their contacts: given along the tangents of `from`, they are along those
-    /// of `to` afterwards.
+    /// Rotates values of the tangential rows with their contacts, from the tangents of `from` to the tangents of
+    /// `to`.
     ///
-    /// With C = T Fᵀ, T and F the tangential rows of a contact in `to` and `from`, they are multiplied by the orthogonal
-    /// factor of the polar decomposition of C: the least turn that takes the one tangential plane to the other, whatever
-    /// tangents are chosen in either.
+    /// With C = T Fᵀ, T and F the tangential rows of a contact in `to` and `from`, the values are multiplied by the
+    /// orthogonal factor of the polar decomposition of C. It is the least rotation from one tangential plane to the
+    /// other, for any choice of the tangents in each plane.
     pub(crate) fn turn<T: Real>(&self, [from, to]: [&ContactJacobian<T>; 2], values: &mut [T]) {
         if std::ptr::eq(from, to) {
             return;
@@ -130,7 +130,7 @@ impl Tangents {
                 1 if dot(0, 0) < T::zero() => values[place] = -values[place],
                 2 => {
                     let ([a, b], [c, d]) = ([dot(0, 0), dot(0, 1)], [dot(1, 0), dot(1, 1)]);
-                    // C + sgn(det C) cof C, which is the orthogonal factor times the sum of the singular values.
+                    // C + sgn(det C) cof C is the orthogonal factor times the sum of the singular values.
                     let sign = if a * d - b * c < T::zero() { -T::one() } else { T::one() };
                     let ([a, b], [c, d]) = ([a + sign * d, b - sign * c], [c - sign * b, d + sign * a]);
                     let size = a.hypot(b);
@@ -144,7 +144,7 @@ impl Tangents {
         }
     }
 
-    /// Whether contacts have the same rows in another list.
+    /// Whether contacts have the same numbers of rows in another list.
     pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
         self.first == other.first
     }
@@ -171,7 +171,8 @@ mod tests {
         assert_eq!(rows, [0, 3, 4, 2, 5]);
     }
 
-    /// A node between tangents turned by any angle, mirrored or not: the same vector, also where the plane leans by 0.1.
+    /// A node with tangents turned by any angle, mirrored or not: the vector is the same, also if the plane tilts by
+    /// 0.1.
     #[test]
     fn entries_turn_with_their_tangents() {
         let mut tangents = Tangents::default();
@@ -189,7 +190,7 @@ mod tests {
             for step in 0..12 {
                 let (sin, cos) = (0.5 * f64::from(step)).sin_cos();
                 for mirror in [1.0, -1.0] {
-                    // The plane leans about x.
+                    // The plane tilts about x.
                     let leaning = |[x, y]: [f64; 2]| [x, lean.cos() * y, lean.sin() * y];
                     let to = rows([leaning([cos, sin]), leaning([-mirror * sin, mirror * cos])]);
                     let mut values = [3.0, 4.0];

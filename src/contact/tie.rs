@@ -1,4 +1,4 @@
-//! Surfaces of two bodies that stay together, whose meshes need not match.
+//! Surfaces of two bodies that are tied to each other; their meshes need not match.
 
 mod joint;
 
@@ -9,48 +9,48 @@ use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use joint::Joint;
 
-/// Share of the mean facet of the coarser surface within which surfaces are tied: more than a curved surface is off its
-/// facets that turn by 45° from one to the next.
+/// Reach as a share of the mean facet of the coarser surface. It exceeds the distance of a curved surface from its
+/// facets if these turn by 45° from one to the next.
 const REACH: f64 = 0.1;
 
-/// Two surfaces that are tied to each other where they meet in the reference configuration; their nodes need not match.
-/// Segments in two dimensions, triangles and bilinear quadrilaterals in three, and those of second order ([`Facet`]),
-/// on which displacements follow the shape functions of second order and N is that of a linear part, as in
-/// [`Mortar`](super::Mortar).
+/// Two surfaces that are tied to each other where they touch in the reference configuration; their nodes need not
+/// match. Facets are segments in two dimensions, triangles and bilinear quadrilaterals in three, or facets of second
+/// order ([`Facet`]). On these, displacements follow the shape functions of second order and N is linear on each
+/// part, as in [`Mortar`](super::Mortar).
 ///
-/// Each node of the one surface, the slave, that the other, the master, covers has an equality row for each axis k: the
-/// jump of the displacement in the mean, with the node's shape function N as weight, over what is covered of the
-/// reference surface,
+/// Each node of the slave surface that the master surface covers has an equality row for each axis k: the mean jump
+/// of the displacement, weighted with the node's shape function N, over the covered part of the reference surface,
 ///
 /// g_k = ∫ N (u_m − u_s)_k dA / ∫ N dA = 0 (length),
 ///
-/// with u_m at the point of the master that lies over the point of the slave along its facet's normal (mesh tying by
-/// mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Where the surfaces lie on
-/// each other any linear displacement passes, whatever the meshes. The force of a row acts along k, positive on the
-/// master and negative on the slave, and ∫ N dA is the node's [`area`](Self::area).
+/// with u_m at the point of the master opposite to the point of the slave, along the normal of its facet (mesh tying
+/// by mortar: Bernardi, Maday and Patera, 1994; Puso, Int. J. Numer. Methods Eng. 59, 2004). Where the surfaces
+/// touch, any linear displacement is transmitted exactly, for any meshes. The force of a row acts along k, positive
+/// on the master and negative on the slave, and ∫ N dA is the node's [`area`](Self::area).
 ///
 /// # Surfaces that do not fit
 ///
-/// Where facets of both surfaces lie upon each other rows are linear in u, and the same for ever. Where they do not, on
-/// curved surfaces with different meshes for instance, x_m − x_s is not zero at the start. It stays what it was, in
-/// axes that turn with each slave facet: g = Σ Rᵀ ∫ N (x_m − x_s) dA / ∫ N dA minus its initial value, R the rotation
-/// of the facet since. So bodies turn freely by any angle and forces conserve angular momentum; with fixed axes such a
-/// gap would resist turning (Puso 2004 moves the nodes instead). These rows [follow](ContactConstraint::follow) the
-/// motion.
+/// Where facets of both surfaces coincide, rows are linear in u and constant. Where they do not, for instance on
+/// curved surfaces with different meshes, x_m − x_s is not zero at the start. It is kept constant in axes that turn
+/// with each slave facet: g = Σ Rᵀ ∫ N (x_m − x_s) dA / ∫ N dA minus its initial value, with the rotation R of the
+/// facet since the start. So bodies turn freely by any angle and forces conserve angular momentum. With fixed axes
+/// such a gap would resist rotation (Puso 2004 moves the nodes instead). These rows
+/// [follow](ContactConstraint::follow) the motion.
 ///
 /// # Which surface is the slave
 ///
-/// The finer one costs more rows, the coarser one is softer at the interface. Nodes of the slave should not be held or
-/// tied by other constraints: rows are then redundant, which costs time and leaves forces that are not unique.
+/// The finer surface as the slave costs more rows, the coarser one makes the interface softer. Nodes of the slave
+/// should not be fixed or tied by other constraints: such rows are redundant, cost time, and their forces are not
+/// unique.
 ///
 /// # Known failure
 ///
 /// - Rates of rows that turn are differences of gaps along the motion.
-/// - Facets that see each other at more than 60° are not tied.
+/// - Facets at more than 60° to each other are not tied.
 ///
 /// # Identity
 ///
-/// (number of the slave node, axis).
+/// (index of the slave node, axis).
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -79,27 +79,28 @@ pub struct Tie<T: Real> {
     reach: f64,
     joint: Joint,
     rows: AffineRows<T>,
-    /// Those before.
+    /// The previous rows.
     before: AffineRows<T>,
     /// For each row its tied node, by place, and its axis.
     listed: Vec<(usize, usize)>,
-    /// What rates need, and how far the last search looks ahead.
+    /// Work space of `rates`, and the time that the last search looks ahead.
     differences: SecondDifference,
     ahead: f64,
 }
 
 impl<T: Real> Tie<T> {
-    /// Ties the facets of a `slave` surface, whose nodes get the rows, to those of a `master`, where they are within
-    /// the [`reach`](Self::reach) of each other.
+    /// Ties the facets of a `slave` surface, whose nodes get the rows, to the facets of a `master` within the
+    /// [`reach`](Self::reach).
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
-    /// dofs of their displacements; facets name nodes by their index there, and their normals point out of the bodies
-    /// ([`Facet`]). The two surfaces share no node. Displacements at the start of a run satisfy the rows, as zero does.
+    /// dofs of their displacements. Facets list nodes by their index there, and their normals point out of the bodies
+    /// ([`Facet`]). The two surfaces must not share a node. Displacements at the start of a run must satisfy the
+    /// rows, as zero does.
     ///
     /// # Errors
     ///
-    /// Those of [`Mortar::new`](super::Mortar::new), except that corners and edges are accepted. That nothing is within
-    /// reach is an error of the first search ([`Error::Empty`]).
+    /// Those of [`Mortar::new`](super::Mortar::new), except that corners and edges are accepted. If no facet is
+    /// within reach, the first search fails ([`Error::Empty`]).
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
@@ -123,8 +124,8 @@ impl<T: Real> Tie<T> {
         Ok(tie)
     }
 
-    /// How far (length) surfaces may be from each other, or in each other, along the normal of the slave's facets to be
-    /// tied: by default a tenth of the mean size of the facets, of the coarser surface.
+    /// Sets the largest gap or penetration (length), along the normal of the slave's facets, at which surfaces are
+    /// tied; by default a tenth of the mean size of the facets, of the coarser surface.
     ///
     /// # Errors
     ///
@@ -135,19 +136,20 @@ impl<T: Real> Tie<T> {
         Ok(self)
     }
 
-    /// The nodes of the slave that are tied, ascending: each has a row an axis.
+    /// The tied nodes of the slave, ascending: each has one row per axis.
     pub fn nodes(&self) -> &[usize] {
         &self.joint.tied
     }
 
-    /// ∫ N dA (area; length in two dimensions) in the reference configuration over what is covered of the facets around
-    /// a tied node, by its place among [`nodes`](Self::nodes): the forces of its rows over this are the traction.
+    /// ∫ N dA (area; length in two dimensions) in the reference configuration over the covered part of the facets
+    /// around a tied node, by its place in [`nodes`](Self::nodes): the forces of its rows divided by it are the
+    /// traction.
     pub fn area(&self, place: usize) -> T {
         T::of(self.joint.areas[place])
     }
 
-    /// Ties of bonds, which may break: rows are along the normal of the slave and across it, turn with the facets, and
-    /// act on places of the dofs of `nodes` as these are.
+    /// Ties of bonds, which may break. Rows are along the normal of the slave and across it, and turn with the
+    /// facets. Their dofs are the places in `nodes`.
     pub(super) fn of_bonds(nodes: Nodes, [slave, master]: [Surface; 2]) -> Self {
         let reach = REACH * slave.typical().max(master.typical());
         let mut joint = Joint::new(&slave, &master, &nodes.coordinates, reach);
@@ -161,12 +163,12 @@ impl<T: Real> Tie<T> {
         tie
     }
 
-    /// The row of the first axis of each node that has rows, and the node by its place among those that are tied.
+    /// For each listed node the row of its first axis, and its place among the tied nodes.
     pub(super) fn listed(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.listed.iter().enumerate().filter(|(_, (_, axis))| *axis == 0).map(|(row, &(place, _))| (row, place))
     }
 
-    /// Finds what meets, and the rows where nothing has moved.
+    /// Finds the tied nodes, and their rows at zero displacement.
     fn join(&mut self) -> Result<()> {
         self.joint = Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach);
         self.nodes.read_bodies([&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface)))?;
@@ -175,7 +177,7 @@ impl<T: Real> Tie<T> {
         Ok(())
     }
 
-    /// Makes the rows with the nodes where they are, at displacements u.
+    /// Makes the rows at the current positions of the nodes, with displacements u.
     fn linearize(&mut self, u: &[T]) {
         let Self { nodes, joint, rows, listed, .. } = self;
         joint.turn(&nodes.positions);
@@ -186,7 +188,7 @@ impl<T: Real> Tie<T> {
         }
     }
 
-    /// Lists the rows of the tied nodes that hold, by place.
+    /// Lists the rows of the tied nodes for which `holds` is true, by place.
     pub(super) fn list_rows(&mut self, holds: impl Fn(usize) -> bool) {
         let Self { nodes, joint, listed, .. } = self;
         let places = (0..joint.tied.len()).filter(|&place| holds(place));
@@ -251,7 +253,7 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
 
     fn follow(&mut self, _t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        // A trial state that is not finite: the gaps say so.
+        // If a trial state is not finite, the gaps are not finite either.
         if !self.joint.turns || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
@@ -260,7 +262,7 @@ impl<T: Real> ContactConstraint<T> for Tie<T> {
         Ok(Candidates::changed_if(self.rows.jacobian != self.before.jacobian))
     }
 
-    /// Nothing comes between what is tied.
+    /// Tied surfaces cannot pass through each other.
     fn inspects(&self) -> bool {
         false
     }

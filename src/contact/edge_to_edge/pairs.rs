@@ -44,7 +44,7 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// The four nodes: those of the first edge come first.
+    /// The four nodes, starting with the first edge.
     pub(super) fn nodes(&self) -> [usize; 4] {
         let [[a, b], [c, d]] = self.edges.map(|edge| edge.nodes);
         [a, b, c, d]

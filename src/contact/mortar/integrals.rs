@@ -11,8 +11,8 @@
 //! under translations and rotations, so that forces along the derivative conserve linear and angular momentum to
 //! rounding.
 //!
-//! With offsets o of the surfaces from their facets the gap is n·(x_m − x_s) − o_s − o_m. Then δx_m − δx_s − (n·(x_m
-//! − x_s)) δn is multiplied by μ + ∇o_m, with the gradient ∇o_m of o_m by the motion of the intersection.
+//! With offsets o of the surfaces from their facets the gap is n·(x_m − x_s) − o_s − o_m. Then μ + ∇o_m multiplies
+//! δx_m − δx_s − (n·(x_m − x_s)) δn, with the gradient ∇o_m of o_m by the motion of the intersection.
 
 use super::dual::{self, Blend, Multiplier};
 use super::pairs::Pairs;

@@ -1,4 +1,4 @@
-//! How an obstacle moves, and how far nodes go against it in a time.
+//! The motion of an obstacle, and bounds of the motion of nodes relative to it.
 
 use crate::contact::RigidMotion;
 use crate::error::Result;
@@ -6,7 +6,7 @@ use crate::real::Real;
 
 use super::super::obstacle::{dot, minus};
 
-/// The motion that a host has given.
+/// The motion set by the host.
 pub(super) enum Motion<'a, T, const D: usize> {
     Rest,
     /// Displacement at t, its velocity and its acceleration.
@@ -15,7 +15,7 @@ pub(super) enum Motion<'a, T, const D: usize> {
 }
 
 impl<T: Real, const D: usize> Motion<'_, T, D> {
-    /// The motion at t, refused if it is none of a rigid body.
+    /// The motion at t; rejected if its rotation is not a rotation.
     pub(super) fn at(&mut self, t: f64) -> Result<RigidMotion<T, D>> {
         match self {
             Self::Rest => Ok(RigidMotion::from([[T::zero(); D]; 3])),
@@ -32,7 +32,7 @@ impl<T: Real, const D: usize> Motion<'_, T, D> {
         matches!(self, Self::Rest)
     }
 
-    /// Whether a normal of the obstacle may be another one in space.
+    /// Whether the normals of the obstacle may change in space.
     pub(super) fn turns(&self) -> bool {
         matches!(self, Self::Turning(_))
     }
@@ -41,7 +41,7 @@ impl<T: Real, const D: usize> Motion<'_, T, D> {
 /// The motion of an obstacle from one time to another.
 pub(super) struct Course<T, const D: usize> {
     pub(super) ends: [RigidMotion<T, D>; 2],
-    /// How far its origin is shifted meanwhile.
+    /// The displacement of its origin between these times.
     carried: [T; D],
     /// The angle by which it turns.
     pub(super) angle: T,
@@ -56,7 +56,7 @@ impl<T: Real, const D: usize> Course<T, D> {
         Self { ends, carried, angle, h }
     }
 
-    /// Square of the length of a way against the obstacle, at most: `way` begins at x and is straight in space.
+    /// A bound of the squared length of a path relative to the obstacle; `way` begins at x and is straight in space.
     pub(super) fn square(&self, x: [T; D], way: [T; D]) -> T {
         let straight = minus(way, self.carried);
         if self.angle == T::zero() {
@@ -68,7 +68,7 @@ impl<T: Real, const D: usize> Course<T, D> {
         length * length
     }
 
-    /// How far the way may lead from the straight line between its ends in the frame of the obstacle.
+    /// A bound of the distance of the path from the straight line between its ends, in the frame of the obstacle.
     pub(super) fn bend(&self, x: [T; D], way: [T; D]) -> T {
         self.ends[0].bend(x, minus(way, self.carried), self.angle, self.h)
     }

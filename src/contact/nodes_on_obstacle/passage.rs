@@ -1,18 +1,19 @@
-//! What a step has done to nodes near an obstacle: refused if one went through it, or was stopped along a wrong normal.
+//! Checks the paths of nodes near an obstacle in a step: whether one went through it, or was stopped along a wrong
+//! normal.
 
 use super::super::obstacle::{dot, minus};
 use super::super::{LARGEST_MISS, LARGEST_TURN, Obstacle, STEEP, press_differently};
 use super::Row;
 use crate::real::Real;
 
-/// Whether an obstacle turns by more in a step than a way along it can be told from its ends.
+/// Whether an obstacle turns so far in a step that its path is not determined by its ends.
 pub(super) fn turns_too_far<T: Real>(angle: T) -> bool {
     angle.value() > LARGEST_TURN.acos()
 }
 
-/// Refuses the way of a node between two places in the frame of the obstacle, begun with a velocity there: what is
-/// wrong, and the gap at its start. The row, if the node has one, comes with its flags at the start and at the end:
-/// closed or not.
+/// Checks the path of a node between two points in the frame of the obstacle, which begins with this velocity.
+/// Returns the reason for a rejection, and the gap at its start. The row of the node, if any, comes with its flags at
+/// the start and at the end: closed or not.
 pub(super) fn look_at<T: Real, const D: usize>(
     obstacle: &dyn Obstacle<T, D>,
     row: Option<(&Row<T, D>, [bool; 2])>,
@@ -39,7 +40,7 @@ pub(super) fn look_at<T: Real, const D: usize>(
         }
         return Ok(());
     }
-    // (Between the ends the gap of the search is linear; what is inside in truth alone was missed.)
+    // Within the step the gap of the row is linear. A node is missed if only the true gap is negative.
     let missed = start + dot(start_normal, way) - gap;
     if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(way, way).sqrt() {
         return Err(("is in the body, and was taken to be outside", start));

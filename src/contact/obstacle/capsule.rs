@@ -1,10 +1,10 @@
-//! A capsule: all that is near a straight piece.
+//! A capsule: all points near a straight line between two points.
 
 use super::{Obstacle, Side, dot, finite, minus, round, round_curvature};
 use crate::error::{Result, positive};
 use crate::real::Real;
 
-/// A straight piece with round ends, of the same thickness everywhere: a rod, a finger, a post.
+/// A straight rod of constant thickness with round ends: a rod, a finger, a post.
 ///
 /// ```
 /// use contact_dynamics::contact::{Capsule, Obstacle};
@@ -34,7 +34,7 @@ impl<T: Real, const D: usize> Capsule<T, D> {
         Ok(Self { ends, radius })
     }
 
-    /// From the closest point of the axis to x; and the axis itself, if that point is between its ends.
+    /// The vector from the closest point of the axis to x; and the axis itself, if that point is between its ends.
     fn off_axis(&self, x: [T; D]) -> ([T; D], Option<[T; D]>) {
         let [from, to] = self.ends;
         let (axis, r) = (minus(to, from), minus(x, from));
@@ -54,7 +54,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Capsule<T, D> {
     fn distance(&self, x: [T; D]) -> (T, [T; D]) {
         let (r, axis) = self.off_axis(x);
         match axis {
-            // On the axis itself any direction across it is right.
+            // On the axis itself any direction across it is valid.
             Some(axis) if dot(r, r) == T::zero() => {
                 let length = dot(axis, axis).sqrt();
                 (-self.radius, super::across(axis.map(|x| x / length))[0])

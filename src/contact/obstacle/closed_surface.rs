@@ -12,18 +12,19 @@ use std::collections::HashMap;
 /// A facet by its index, in its box.
 type Leaf = GeomWithData<Rectangle<Point>, usize>;
 
-/// A rigid body whose surface is given by triangles, as of an STL file; in two dimensions by the segments of a polygon.
-/// The obstacle is all within a radius of that body, so that no edge that sticks out is sharp.
+/// A rigid body whose surface is given by triangles, for instance from an STL file, or in two dimensions by the
+/// segments of a polygon. The obstacle is the set of all points within a radius of that body, so that no convex edge
+/// is sharp.
 ///
-/// Facets name their vertices counter-clockwise if seen from outside, segments with the body on their left. The
-/// surface may have several parts, and hollows. It must not intersect itself, which is not looked at; then the side on
-/// which a point is follows from the normals at the closest facet, edge or vertex (Bærentzen and Aanæs, 2005,
-/// doi:10.1109/TVCG.2005.49). The closest facet is found in an R*-tree.
+/// Facets list their vertices counter-clockwise seen from outside, segments with the body on their left. The surface
+/// may have several parts, and hollows. It must not intersect itself; this is not checked. Then the normals at the
+/// closest facet, edge or vertex determine the side of a point (Bærentzen and Aanæs, 2005, doi:10.1109/TVCG.2005.49).
+/// The closest facet is found in an R*-tree.
 ///
-/// The distance is exact, and its normal turns within the radius around an edge, which steps must resolve where nodes
-/// press on it: on a round body by the angle between two facets, on a way of the radius times that. Flat facets are
-/// moved outward by the radius. In notches, where the surface is not convex, the normal jumps from one face to the
-/// other.
+/// The distance is exact. Within the radius around an edge its normal turns, and steps must resolve this where nodes
+/// press on it: on a round body the normal turns by the angle between two facets, over the length of the radius times
+/// that angle. Flat facets are moved outward by the radius. In notches, where the surface is not convex, the normal
+/// jumps from one face to the other.
 ///
 /// ```
 /// use contact_dynamics::contact::{ClosedSurface, Obstacle};
@@ -47,7 +48,7 @@ pub struct ClosedSurface<T, const D: usize> {
     rounding: T,
 }
 
-/// A point of the surface that is closest to another one.
+/// The point of the surface closest to another point.
 #[derive(Clone, Copy)]
 struct Nearest {
     facet: usize,
@@ -59,16 +60,16 @@ fn in_space<T: Real, const D: usize>(x: [T; D]) -> Point {
 }
 
 impl<T: Real, const D: usize> ClosedSurface<T, D> {
-    /// From vertices, facets that name them (segments of two in two dimensions, triangles in three), and the radius of
-    /// its edges (length).
+    /// From vertices, facets that list them (two for segments in two dimensions, three for triangles), and the radius
+    /// of the edges (length).
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`] unless the radius is positive and finite; [`Error::NotFinite`] for the vertices;
-    /// [`Error::Empty`] without facets; [`Error::Dimension`] for vertices that there are not;
-    /// [`Error::InvertedFacet`] for a facet without length or area, or one turned against its neighbors;
-    /// [`Error::Incompatible`], which says where, if the surface has an end, branches or touches itself at a vertex, or
-    /// if all of its normals point inward.
+    /// [`Error::Empty`] without facets; [`Error::Dimension`] for vertices that do not exist; [`Error::InvertedFacet`]
+    /// for a facet without length or area, or turned against its neighbors; [`Error::Incompatible`], with the
+    /// location, if the surface has an end, branches or touches itself at a vertex, or if all of its normals point
+    /// inward.
     pub fn new(vertices: &[[T; D]], facets: &[[usize; D]], rounding: T) -> Result<Self> {
         positive("the radius of a closed surface's edges", rounding.value())?;
         for (index, vertex) in vertices.iter().enumerate() {
@@ -94,8 +95,8 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         Ok(Self { surface, positions, tree, rounding })
     }
 
-    /// From facets that have their vertices with them, as STL files do: vertices that are equal to the last bit are
-    /// one. Otherwise as [`new`](Self::new).
+    /// From facets given with their vertices, as in STL files: vertices that are bitwise equal are one. Otherwise as
+    /// [`new`](Self::new).
     ///
     /// # Errors
     ///
@@ -103,7 +104,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
     pub fn from_loose_facets(facets: &[[[T; D]; D]], rounding: T) -> Result<Self> {
         let (mut vertices, mut places) = (Vec::new(), HashMap::new());
         let mut place = |vertex: [T; D]| {
-            // (−0 is 0.)
+            // −0 counts as 0.
             let key = vertex.map(|x| (x.value() + 0.0).to_bits());
             *places.entry(key).or_insert_with(|| {
                 vertices.push(vertex);
@@ -121,7 +122,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         best
     }
 
-    /// Looks through a node of the tree, the closest of its children first.
+    /// Searches a node of the tree, the closest of its children first.
     fn descend(&self, node: &ParentNode<Leaf>, p: Point, best: &mut Option<Nearest>) {
         let away = |child: &RTreeNode<Leaf>| child.envelope().distance_2(&p);
         let children = node.children();
@@ -130,7 +131,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         let order = [closest].into_iter().chain((0..children.len()).filter(|&k| k != closest));
         for child in order.filter_map(|k| children.get(k)) {
             let limit = best.map_or(f64::INFINITY, |best| best.projected.1.distance);
-            // (Both sides are rounded.)
+            // Both sides are rounded.
             if away(child) > limit * limit * (1.0 + 16.0 * f64::EPSILON) {
                 continue;
             }
@@ -139,7 +140,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
                 RTreeNode::Leaf(leaf) => {
                     let facet = leaf.data;
                     let Some(projected) = self.surface.project(facet, p, &self.positions) else { continue };
-                    // (Of facets as near the first: the order in the tree does not matter.)
+                    // Of equally near facets the first one, so that the order in the tree does not matter.
                     let nearer = |best: &Nearest| {
                         let (new, old) = (projected.1.distance, best.projected.1.distance);
                         new < old || new <= old && facet < best.facet
@@ -152,14 +153,14 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         }
     }
 
-    /// The normal and the signed distance from the surface itself.
+    /// The normal, and the signed distance from the surface without the rounding.
     fn direction(&self, p: Point, nearest: &Nearest) -> Option<(Point, f64)> {
         let rounding = f64::EPSILON.sqrt();
         self.surface.direction(nearest.facet, p, &nearest.projected, (rounding, &|_| true), &self.positions)
     }
 }
 
-/// Refuses a surface that encloses nothing, or does so inside out.
+/// Rejects a surface that does not enclose a volume, or whose normals point inward.
 fn check(surface: &Surface, positions: &[Point]) -> Result<()> {
     if let Some(facet) = surface.open_facet() {
         let part = format!("facet {facet} of a closed surface");
@@ -200,7 +201,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for ClosedSurface<T, D> {
         if foot.distance <= f64::EPSILON.sqrt() * shape.size() {
             return T::zero();
         }
-        // Around an edge or a vertex the normal turns with what goes across it.
+        // Around an edge or a vertex the normal turns with the velocity across it.
         let across = |w: Point, n: Point| -> Point { std::array::from_fn(|k| w[k] - dot(w, n) / dot(n, n) * n[k]) };
         let around = match foot.location {
             Location::Inside | Location::Beyond => return T::zero(),

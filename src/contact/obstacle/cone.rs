@@ -4,10 +4,10 @@ use super::{Obstacle, Side, across, dot, finite, length, minus, round, round_cur
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
-/// A straight round cone with a flat base, its tip and its rim rounded: a funnel's plug, an indenter, a bit.
+/// A straight round cone with a flat base and a rounded tip and rim: a funnel's plug, an indenter, a bit.
 ///
-/// Tip and rim are not sharp for the reason that edges of a [`Cuboid`](super::Cuboid) are not. The rounding takes away
-/// from the sharp cone, whose base and side are kept: of a cone of radius R, height H and slant S = √(R² + H²) the tip
+/// Tip and rim are not sharp for the same reason as the edges of a [`Cuboid`](super::Cuboid). The rounding removes a
+/// part of the sharp cone and keeps its base and side: for radius R, height H and slant S = √(R² + H²) the tip
 /// recedes by ρ (S/R − 1).
 ///
 /// ```
@@ -22,17 +22,17 @@ use crate::real::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone<T> {
-    /// Center of the base and direction to the tip of the cone that is left without the rounding.
+    /// Center of the base, and direction to the tip, of the cone without the rounding.
     base: [T; 3],
     axis: [T; 3],
     height: T,
     radius: T,
-    /// Parts across and along the axis of the normal of the side.
+    /// Components of the normal of the side across and along the axis.
     side: [T; 2],
     rounding: T,
 }
 
-/// Where a point is beside a cone, with its arm from the nearest vertex of the meridian if that is nearest.
+/// The nearest part of a cone; for a vertex of the meridian with the vector from it to the point.
 enum Nearest<T> {
     /// Distance and normal of a face, across and along the axis.
     Face(T, [T; 2]),
@@ -41,13 +41,13 @@ enum Nearest<T> {
 }
 
 impl<T: Real> Cone<T> {
-    /// From the center of its base, its tip and the radius of its base as if both were sharp, and the radius of its
+    /// From the center of its base, its tip and the radius of its base as for a sharp cone, and the radius of its
     /// rounding (lengths).
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] if base and tip are one point, unless the radii are positive and finite, and if the
-    /// rounding is larger than the ball that fits into the cone; [`Error::NotFinite`].
+    /// [`Error::Parameter`] if base and tip are the same point, unless the radii are positive and finite, and if the
+    /// rounding is larger than the radius of the ball that fits into the cone; [`Error::NotFinite`].
     pub fn new(base: [T; 3], tip: [T; 3], radius: T, rounding: T) -> Result<Self> {
         finite("the center of the cone's base", &base)?;
         finite("the tip of the cone", &tip)?;
@@ -73,13 +73,13 @@ impl<T: Real> Cone<T> {
         })
     }
 
-    /// The direction from the axis to x, how far it is from the axis, and its height above the base.
+    /// The direction from the axis to x, the distance from the axis, and the height above the base.
     fn meridian(&self, x: [T; 3]) -> ([T; 3], T, T) {
         let r = minus(x, self.base);
         let z = dot(r, self.axis);
         let off: [T; 3] = std::array::from_fn(|k| r[k] - z * self.axis[k]);
         let s = length(off);
-        // On the axis itself any direction across it is right, and within rounding of it none is known.
+        // On the axis itself any direction across it is valid; within rounding of it the direction is unknown.
         let rounding = T::of(4.0) * T::epsilon() * (length(r) + self.height);
         let outward = if s <= rounding { across(self.axis)[0] } else { off.map(|x| x / s) };
         (outward, s, z)
@@ -124,7 +124,7 @@ impl<T: Real> Obstacle<T, 3> for Cone<T> {
         let (out, along) = (dot(w, outward), dot(w, self.axis));
         let meridional = std::array::from_fn(|k| out * outward[k] + along * self.axis[k]);
         let around = minus(w, meridional);
-        // A normal with the part n across the axis turns by n φ as one goes around by φ.
+        // A normal with the component n across the axis turns by n φ along an arc of the angle φ.
         let circling = |n: T| if s > T::zero() { n * (dot(around, around) / s) } else { T::zero() };
         match self.nearest(meridian) {
             Nearest::Face(_, [n, _]) => circling(n),

@@ -6,8 +6,8 @@ use crate::real::Real;
 
 /// A box, a rectangle in two dimensions, with sides along the axes and rounded edges.
 ///
-/// No edge is sharp: a node that slides over one would meet a normal that turns within no time, which no step can
-/// follow. Steps must resolve the rounding where nodes press on it, or are made smaller by step control.
+/// No edge is sharp: at a sharp edge the normal would turn in no time, which no step can resolve. Steps must resolve
+/// the rounding where nodes press on it; step control reduces them.
 ///
 /// ```
 /// use contact_dynamics::contact::{Cuboid, Obstacle};
@@ -21,13 +21,13 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid<T, const D: usize> {
     center: [T; D],
-    /// Half of the sides, without the rounding.
+    /// Half of the side lengths, without the rounding.
     half: [T; D],
     rounding: T,
 }
 
 impl<T: Real, const D: usize> Cuboid<T, D> {
-    /// Around a center, with half of its sides and the radius of its edges (lengths).
+    /// Around a center, with half of its side lengths and the radius of its edges (lengths).
     ///
     /// # Errors
     ///
@@ -77,7 +77,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Cuboid<T, D> {
             let normal = std::array::from_fn(|k| signs[k] * scaled[k] / length);
             return (beyond[farthest] * length - self.rounding, normal);
         }
-        // NaN goes on into the distance.
+        // NaN is passed on to the distance.
         let distance = beyond.iter().fold(beyond[farthest], |most, x| if x.is_nan() { *x } else { most });
         (distance - self.rounding, std::array::from_fn(|k| if k == farthest { signs[k] } else { T::zero() }))
     }

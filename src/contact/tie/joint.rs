@@ -1,53 +1,53 @@
-//! What is tied to what: integrals of shape functions over the part of a surface that another one covers, found once,
-//! and the rows that they make in axes that turn with the facets.
+//! The integrals of shape functions over the covered part of a surface, found once, and the rows from them, in axes
+//! that turn with the facets.
 
 use crate::contact::surface::{
     Base, ByNode, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
 };
 use std::ops::Range;
 
-/// Share of what a node's shape function would cover that must be covered for a row.
+/// Least covered share of a node's area for a row.
 const LEAST: f64 = 1e-6;
 
-/// Share of a facet within which surfaces lie upon each other: rows are then the same for ever.
+/// Distance of surfaces, as a share of a facet, up to which they coincide: then rows are constant.
 const FITS: f64 = 1e-8;
 
 /// The axes of space.
 const SPACE: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The tied nodes and what their rows are made of.
+/// The tied nodes and the data of their rows.
 #[derive(Debug, Default)]
 pub(super) struct Joint {
-    /// Nodes of the slave with rows, ascending, and ∫ N dA over what is covered.
+    /// Nodes of the slave with rows, ascending, and ∫ N dA over their covered part.
     pub(super) tied: Vec<usize>,
     pub(super) areas: Vec<f64>,
-    /// Whether surfaces do not fit, so that axes must turn.
+    /// Whether surfaces do not coincide, so that axes must turn.
     pub(super) turns: bool,
     pieces: Vec<Piece>,
     terms: Vec<Term>,
-    /// The nodes that the rows of each tied node act on, ascending.
+    /// The nodes on which the rows of each tied node act, ascending.
     starts: Vec<usize>,
     columns: Vec<usize>,
     /// The gaps at the start by tied node, in axes of space.
     initial: Vec<Point>,
-    /// For each tied node the axes of its rows in the reference configuration: those of space, or its normal and
-    /// directions across it.
+    /// For each tied node the axes of its rows in the reference configuration: the axes of space, or its normal and
+    /// tangents.
     frames: Vec<[Point; 3]>,
-    /// For each of `columns` what the rows of the three axes have of it.
+    /// For each entry of `columns` the weights of the rows of the three axes.
     weights: Vec<[Point; 3]>,
     gaps: Vec<Point>,
     /// By tied node the mean directions of the axes.
     directions: Vec<[Point; 3]>,
 }
 
-/// A slave facet that is covered, in part at least.
+/// A slave facet that is at least partly covered.
 #[derive(Debug)]
 struct Piece {
     facet: Facet,
     /// Its frame in the reference configuration.
     frame: [Point; 3],
     terms: Range<usize>,
-    /// For each corner with rows its place among the tied, and where its rows have the corners.
+    /// For each corner with rows its place among the tied nodes, and the slots of the facet's corners in its rows.
     rows: [Option<(usize, [usize; 4])>; 4],
 }
 
@@ -57,12 +57,12 @@ struct Term {
     /// Corner a of the facet.
     corner: usize,
     node: usize,
-    /// Where the rows of a have the node.
+    /// The slot of the node in the rows of a.
     slot: usize,
     weight: f64,
 }
 
-/// What is found over a slave facet: (corner, node, ∫ N_corner N_node dA with the sign of a term).
+/// Integrals over a slave facet: (corner, node, ∫ N_corner N_node dA with the sign of a term).
 struct Covered {
     facet: Facet,
     frame: [Point; 3],
@@ -70,7 +70,7 @@ struct Covered {
 }
 
 impl Joint {
-    /// Finds what of the slave is covered by facets of the master within `reach` along the normal.
+    /// Finds the parts of the slave that are covered by facets of the master within `reach` along the normal.
     pub(super) fn new(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> Self {
         let (covered, areas) = cover(slave, master, positions, reach);
         let whole = slave.areas_at(positions);
@@ -86,12 +86,12 @@ impl Joint {
         joint
     }
 
-    /// The place of a node among the tied.
+    /// The place of a node among the tied nodes.
     fn place(&self, node: usize) -> Option<usize> {
         self.tied.binary_search(&node).ok()
     }
 
-    /// Where the rows of a tied node have a node.
+    /// The slot of a node in the rows of a tied node.
     fn slot(&self, place: usize, node: usize) -> usize {
         let range = self.starts[place]..self.starts[place + 1];
         range.start + self.columns[range].partition_point(|&other| other < node)
@@ -110,7 +110,7 @@ impl Joint {
         self.columns = columns.into_iter().map(|(_, node)| node).collect();
     }
 
-    /// Takes what rows are made of, and the gaps at the start.
+    /// Stores the data of the rows, and the gaps at the start.
     fn take(&mut self, covered: &[Covered], positions: &[Point]) {
         for Covered { facet, frame, parts } in covered {
             let mut rows = [None; 4];
@@ -143,7 +143,7 @@ impl Joint {
         }
     }
 
-    /// Lets axes turn, and the first one be the normal of the slave, in the mean over a node's share of it.
+    /// Makes axes turn, with the slave's mean normal over a node's area as the first axis.
     pub(super) fn align(&mut self, nodes: &Nodes) {
         self.turns = true;
         let mut normals = vec![[0.0; 3]; self.tied.len()];
@@ -155,14 +155,14 @@ impl Joint {
             }
         }
         for (frame, normal) in self.frames.iter_mut().zip(normals) {
-            // (A sum that vanishes is that of a sheet that is folded flat: any direction is as good.)
+            // The sum vanishes only for a sheet folded flat, where any direction is as good.
             let normal = unit(normal).unwrap_or(SPACE[0]);
             frame[0] = normal;
             frame[1..].iter_mut().zip(nodes.tangents(normal)).for_each(|(axis, tangent)| *axis = tangent);
         }
     }
 
-    /// Σ weight · x of the terms of each corner: how far the master is from the slave. (Weights sum to zero.)
+    /// Σ weight · x of the terms of each corner: the vector from slave to master. Weights sum to zero.
     fn apart(&self, piece: &Piece, positions: &[Point]) -> [Point; 4] {
         let origin = positions[piece.facet.nodes[0]];
         let mut apart = [[0.0; 3]; 4];
@@ -172,8 +172,8 @@ impl Joint {
         apart
     }
 
-    /// The axes of the rows of a piece's corners, if its facet lies like this (none if it has lost its area: gaps that
-    /// are no numbers are refused).
+    /// The axes of the rows of a piece's corners, with its facet at `base`. Without `base` the facet has lost its
+    /// area: then the axes are NaN, and the gaps are rejected.
     fn axes(&self, piece: &Piece, base: Option<&Base>) -> [[Point; 3]; 4] {
         let space = match (base, self.turns) {
             (Some(base), true) => turned(&piece.frame, &base.frame()),
@@ -183,7 +183,7 @@ impl Joint {
         piece.rows.map(|row| row.map_or(space, |(place, _)| within(&space, &self.frames[place])))
     }
 
-    /// Finds the [gaps](Self::gap) for nodes at these positions, and leaves the rows as they are.
+    /// Finds the [gaps](Self::gap) at these positions of the nodes, without changing the rows.
     pub(super) fn gaps_at(&mut self, positions: &[Point]) {
         let mut gaps = std::mem::take(&mut self.gaps);
         gaps.fill([0.0; 3]);
@@ -197,7 +197,7 @@ impl Joint {
         self.gaps = gaps;
     }
 
-    /// Makes the rows for nodes at these positions.
+    /// Makes the rows at these positions of the nodes.
     pub(super) fn turn(&mut self, positions: &[Point]) {
         self.gaps_at(positions);
         self.weights.fill([[0.0; 3]; 3]);
@@ -230,7 +230,7 @@ impl Joint {
         }
     }
 
-    /// The gap of a tied node along an axis where the rows were made.
+    /// The gap of a tied node along an axis, at the positions of the rows or of the last `gaps_at`.
     pub(super) fn gap(&self, place: usize, axis: usize) -> f64 {
         match self.turns {
             true => self.gaps[place][axis] - dot(self.initial[place], self.frames[place][axis]),
@@ -238,7 +238,7 @@ impl Joint {
         }
     }
 
-    /// Its row: nodes, and what their displacements are multiplied by.
+    /// Its row: nodes, and the weights of their displacements.
     pub(super) fn row(&self, place: usize, axis: usize) -> impl Iterator<Item = (usize, Point)> + '_ {
         let range = self.starts[place]..self.starts[place + 1];
         range.map(move |slot| (self.columns[slot], self.weights[slot][axis]))
@@ -249,7 +249,7 @@ impl Joint {
         self.directions[place][axis]
     }
 
-    /// The nodes of a surface that the rows act on, ascending.
+    /// The nodes of a surface on which the rows act, ascending.
     pub(super) fn nodes_of(&self, surface: &Surface) -> Vec<usize> {
         let mut nodes: Vec<usize> = self.columns.clone();
         nodes.sort_unstable();
@@ -261,25 +261,25 @@ impl Joint {
 }
 
 impl Piece {
-    /// Whether a term is that of a node of the master.
+    /// Whether a term belongs to a node of the master.
     fn is_of_master(&self, term: &Term) -> bool {
         self.facet.all_nodes().all(|node| node != term.node)
     }
 }
 
-/// The vectors that a frame has, for axes of space where these are now.
+/// The vectors of a frame, given the current directions of the axes of space.
 fn within(space: &[Point; 3], frame: &[Point; 3]) -> [Point; 3] {
     let vector = |v: Point| v.iter().zip(space).fold([0.0; 3], |sum, (&v, &axis)| add_scaled(sum, v, axis));
     frame.map(vector)
 }
 
-/// Where the axes of space are that have turned as a frame has.
+/// The axes of space, turned by the rotation from one frame to another.
 fn turned(from: &[Point; 3], to: &[Point; 3]) -> [Point; 3] {
     let axis = |k: usize| from.iter().zip(to).fold([0.0; 3], |sum, (from, &to)| add_scaled(sum, from[k], to));
     [axis(0), axis(1), axis(2)]
 }
 
-/// What of each slave facet is covered, and ∫ N dA over it by place of the slave's nodes.
+/// The covered part of each slave facet, and ∫ N dA over it by place of the slave's nodes.
 fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> (Vec<Covered>, Vec<f64>) {
     let mut lists = Neighborhood::default();
     lists.build(slave.boxes(positions), master.boxes(positions), reach);
@@ -320,7 +320,7 @@ fn cover(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> 
     (all, areas)
 }
 
-/// Lists what the corners of a slave facet have of the nodes of a facet.
+/// Lists the integrals of the corners of a slave facet with the nodes of a facet.
 fn push_parts(facet: &Facet, integrals: &[ByNode], parts: &mut Vec<(usize, usize, f64)>) {
     for (corner, integrals) in integrals.iter().enumerate() {
         parts.extend(facet.all_nodes().zip(integrals).map(|(node, &integral)| (corner, node, integral)));
