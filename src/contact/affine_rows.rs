@@ -70,7 +70,6 @@ impl<T: Real> AffineRows<T> {
         self.gaps.push(other.gaps[row]);
     }
 
-    /// The gap of a row at u.
     pub(super) fn gap(&self, row: usize, u: &[T]) -> T {
         let Self { jacobian, gaps, displacements } = self;
         let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];

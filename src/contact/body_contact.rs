@@ -12,7 +12,7 @@ use crate::real::Real;
 ///
 /// Weighted gaps spread contact over faces, but not between facets at more than 60° to each other. Alone they would
 /// let corners and edges penetrate, and the bodies could gain energy from the recovery. Therefore [`Mortar`] rejects
-/// surfaces with corners. This list of constraints contains those that the shape of the bodies needs:
+/// surfaces with corners. This list has the constraints that the shape of the bodies needs:
 ///
 /// 1. [`Mortar`] of the whole surfaces;
 /// 2. [`NodeToFacet`] of the slave's nodes at sharp edges (in two dimensions: at sharp corners) with the master's
@@ -33,7 +33,7 @@ use crate::real::Real;
 /// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
 /// - As with [`Mortar`], nodes within faces are kept out only in the mean over their facets: they penetrate by a
 ///   tenth of an element in blocks that fall on edges (`docs/contact.md` has a table). A surface against itself has
-///   no weighted gaps: its pressures are those of nodes on facets.
+///   no weighted gaps; its pressures come from nodes on facets.
 ///
 /// ```
 /// use contact_dynamics::contact::BodyContact;
@@ -251,9 +251,9 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         Ok(())
     }
 
-    /// The constraints in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's
-    /// sharp nodes on the slave's facets, edges on edges. For a surface against itself: nodes on facets, edges on
-    /// edges. Constraints for which a body has no sharp nodes or edges are left out.
+    /// The constraints in this order: weighted gaps, the slave's sharp nodes on the master's facets, the master's on
+    /// the slave's, edges on edges. For a surface against itself: nodes on facets, edges on edges. Without sharp
+    /// nodes or edges their constraints are left out.
     ///
     /// # Errors
     ///

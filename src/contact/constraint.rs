@@ -9,7 +9,7 @@ use crate::real::Real;
 /// As an element, a constraint has its own list of dofs: [`dofs`](Self::dofs) returns it once, and every vector that
 /// is passed to the constraint has one entry for each of them, in this order. Rows refer to *places* in that list.
 ///
-/// Rows are those of the last [`search`](Self::search) or [`follow`](Self::follow). Gaps are evaluated for any u,
+/// Rows come from the last [`search`](Self::search) or [`follow`](Self::follow). Gaps are evaluated for any u,
 /// exactly or by these rows, `g = g* + G (u − u*)`. Evaluations are pure. Signs: g > 0 is open; the contact force on
 /// the system is Gᵀ λ, λ > 0 in compression.
 ///
@@ -159,8 +159,8 @@ pub trait ContactConstraint<T: Real>: Send {
     }
 
     /// Checks a step before it is accepted. It is rejected here if bodies have gone through each other, or if a
-    /// contact was found along a normal that differs from the normal where it occurs. Candidates are those of the
-    /// search at the start of the step. Default: every step is accepted.
+    /// contact was found along a normal that differs from the normal where it occurs. Candidates are from the search
+    /// at the start of the step. Default: every step is accepted.
     ///
     /// # Errors
     ///

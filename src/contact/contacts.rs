@@ -31,7 +31,6 @@ pub struct Contacts<T> {
     magnitudes: Vec<T>,
     recoveries: Vec<T>,
     tangents: ContactJacobian<T>,
-    /// The first tangent of each contact.
     first_tangents: Vec<usize>,
     frictions: Vec<f64>,
     positions: Vec<Option<[T; 3]>>,
@@ -137,7 +136,7 @@ impl<T: Real> Contacts<T> {
         &self.rows
     }
 
-    /// Whether names and rows equal those of another list.
+    /// Whether names and rows are equal to another list.
     pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
         self.names == other.names && self.rows == other.rows
     }
@@ -173,7 +172,6 @@ impl<T: Real> Contacts<T> {
         self.first_tangents[contact]..end
     }
 
-    /// Whether any candidate has friction.
     pub(crate) fn has_friction(&self) -> bool {
         self.frictions.iter().any(|&friction| friction != 0.0)
     }

@@ -112,9 +112,7 @@ pub struct EdgeToEdge<T: Real> {
     surfaces: [Surface; 2],
     edges: [Vec<Edge>; 2],
     vicinity: Vicinity,
-    /// Nodes of the edges, by edge.
     ends_of: [Vec<[usize; 2]>; 2],
-    /// Whether each dof belongs to an edge.
     acts: Vec<bool>,
     /// The length of the shortest edge, in the reference configuration.
     finest: f64,
@@ -359,7 +357,6 @@ impl<T: Real> EdgeToEdge<T> {
         Ok(())
     }
 
-    /// The edges at t.
     fn sides(&self, t: f64) -> Sides<'_> {
         let Self { edges, surfaces, vicinity, .. } = self;
         Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) }

@@ -9,7 +9,6 @@ type Function<'a, T> = Box<dyn FnMut(f64, &[T], &[T], &mut [T]) -> Result<[T; 3]
 
 type Tangents<'a, T> = Box<dyn FnMut(f64, &[T], &mut [T]) -> [[T; 2]; 2] + Send + 'a>;
 
-/// The friction of a row.
 struct Friction<'a, T> {
     coefficient: f64,
     function: Tangents<'a, T>,

@@ -16,7 +16,6 @@ pub(crate) trait Gaps<T: Real> {
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()>;
 
-    /// The rows of friction.
     fn tangents(&self) -> &Tangents;
 
     /// The parts of slips and of their rates that do not come from v and a, one entry per tangential row.

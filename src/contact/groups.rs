@@ -3,7 +3,6 @@
 
 use std::ops::Range;
 
-/// Rows of G sorted into groups.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Groups {
     /// Positions in the list of rows, group after group. They ascend within a group; so do the first positions of the
@@ -103,7 +102,6 @@ impl Groups {
         }
     }
 
-    /// Number of groups.
     pub(crate) fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
@@ -155,7 +153,7 @@ mod tests {
         groups.sort(&[0, 2, 4], 10, |_| false, acts_on);
         let found: Vec<&[usize]> = (0..groups.len()).map(|k| groups.group(k)).collect();
         assert_eq!(found, [[0], [1], [2]]);
-        // Row 4 is that of the contact before it.
+        // Row 4 belongs to the contact before it.
         groups.sort(&[0, 1, 4, 2], 10, |row| row == 4, acts_on);
         let found: Vec<&[usize]> = (0..groups.len()).map(|k| groups.group(k)).collect();
         assert_eq!(found, [&[0][..], &[1, 2], &[3]]);

@@ -28,11 +28,11 @@ pub enum ContactLaw {
     /// Bilateral: g = 0, λ of either sign (ties, motions prescribed by multipliers).
     Equality,
     /// Newton's impact law (Moreau 1988): 0 ≤ ġ′ + e ġ ⊥ λ ≥ 0, with ġ the rate at the start of the stage, for
-    /// schemes that impose contact on velocities. If contact is imposed on the displacements of the state, a contact
-    /// that closes leaves with e times the rate at which its gap reached zero, by the
-    /// [`PersistencyCorrection`](crate::PersistencyCorrection). With several contacts at once it is the law of
-    /// simultaneous impact. For Newton's cradle it does not give the outcome of pairwise impacts in sequence. Schemes
-    /// that impose contact ahead of the state do not accept it.
+    /// schemes that impose contact on velocities. If contact is imposed on the displacements of the state,
+    /// [`PersistencyCorrection`](crate::PersistencyCorrection) lets a contact that closes leave with e times the rate
+    /// at which its gap reached zero. With several contacts at once it is the law of simultaneous impact, which for
+    /// Newton's cradle differs from pairwise impacts in sequence. Schemes that impose contact ahead of the state do
+    /// not accept it.
     ///
     /// ```
     /// use contact_dynamics::contact::ContactLaw;
@@ -120,8 +120,8 @@ pub enum ContactLaw {
     ///
     /// * The force jumps to c δ̇ where bodies touch at speed, at some time within a step: errors are of first order.
     ///   [`HuntCrossley`](Self::HuntCrossley) has no jump.
-    /// * A mass m that impacts at the speed v leaves with e v, for any v; with ξ = c/(2 √(k m)) < 1, e = exp(−ξ φ/√(1
-    ///   − ξ²)), cos φ = 2 ξ² − 1.
+    /// * A mass m that impacts at the speed v leaves with e v, for any v. With ξ = c/(2 √(k m)) < 1 it is e = exp(−ξ
+    ///   φ/√(1 − ξ²)), cos φ = 2 ξ² − 1.
     /// * [`Works::contact`](crate::Works::contact) has the work of the spring, −½ k δ²;
     ///   [`Works::damping`](crate::Works::damping) has the rest of the work of contact forces.
     ///
@@ -149,7 +149,7 @@ pub enum ContactLaw {
         damping: f64,
     },
     /// A spring with a dissipation that grows with its compression (Hunt and Crossley, J. Appl. Mech. 42, 1975): with
-    /// δ = −g > 0, λ = k δ^p ⟨1 + χ δ̇⟩. The force begins and ends at zero, so that errors are those of a spring. An
+    /// δ = −g > 0, λ = k δ^p ⟨1 + χ δ̇⟩. The force begins and ends at zero, so that errors are as for a spring. An
     /// impact at the speed v leaves with the speed w given by v − ln(1 + χ v)/χ = −w − ln(1 − χ w)/χ, for any mass, k
     /// and p: e = w/v is 1 − ⅔ χ v + … for small χ v. Works are booked as for [`KelvinVoigt`](Self::KelvinVoigt).
     ///
@@ -186,8 +186,8 @@ pub enum ContactLaw {
     ///
     /// with the predicted ĝ₊. While contact lasts it equals the plain form, k g + m g̈. The plain form also counts ḡ₋
     /// of open gaps, and its impacts create energy by the work of that term; here the mass acts only during contact.
-    /// The critical step is that of the mesh, for any k. Without loads, for linear gaps and an obstacle at rest, the
-    /// energy
+    /// The mesh alone determines the critical step, for any k. Without loads, for linear gaps and an obstacle at
+    /// rest, the energy
     ///
     /// ```text
     /// ½ v̂ᵀ M v̂ + ½ uₙᵀ K uₙ₊₁ + ½ k ⟨−ḡ⟩²,      v̂ = (uₙ₊₁ − uₙ)/h,      ḡ = ½ (gₙ + gₙ₊₁)
@@ -371,8 +371,8 @@ impl ContactLaw {
         }
     }
 
-    /// Whether a compliant law reads the gap that the scheme constrains ahead of the state, in addition to those of
-    /// the step.
+    /// Whether a compliant law reads the gap that the scheme constrains ahead of the state, besides the gaps of the
+    /// step.
     pub(crate) fn is_predictive(&self) -> bool {
         matches!(self, Self::StabilizedBipenalty { .. })
     }
@@ -388,7 +388,6 @@ impl ContactLaw {
         if self.keeps_depths() { kept_depth(gap, recovery) } else { T::zero() }
     }
 
-    /// Whether the row is bilateral.
     pub(crate) fn is_equality(&self) -> bool {
         *self == Self::Equality
     }

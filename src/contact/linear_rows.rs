@@ -14,7 +14,6 @@ type Drag<'a, T> = Box<dyn FnMut(f64) -> [[T; 2]; 2] + Send + 'a>;
 /// The (dof, weight) pairs of a row without other data, and its law.
 pub(crate) type PlainRow<T> = (Vec<(usize, T)>, ContactLaw);
 
-/// The friction of a row.
 struct Friction<'a, T> {
     row: usize,
     coefficient: f64,
@@ -97,7 +96,6 @@ pub struct LinearRows<'a, T: Real> {
     bonds: Vec<Bond>,
     /// Dofs are places in the list.
     tangents: ContactJacobian<T>,
-    /// In the order of their rows.
     frictions: Vec<Friction<'a, T>>,
     coordinates: T,
     /// Whether the given numbers have been checked.

@@ -411,12 +411,10 @@ impl<T: Real> Mortar<T> {
         T::of(self.rows.spots[row].area)
     }
 
-    /// The number of tangents of a row.
     fn tangents(&self) -> usize {
         if self.friction == 0.0 { 0 } else { self.nodes.dimension - 1 }
     }
 
-    /// The size of the smallest facet of both surfaces.
     fn finest(&self) -> f64 {
         self.slave.finest().min(self.master.finest())
     }

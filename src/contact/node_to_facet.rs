@@ -65,7 +65,7 @@ impl Pass {
 /// iteration would not converge.
 ///
 /// Around a side or a vertex the curvature of a gap is the reciprocal of its distance. Closer than 1e-3 of the facet,
-/// rates leave this out and are those of the facet.
+/// rates leave this curvature out.
 ///
 /// # Which facet, which normal
 ///
@@ -88,8 +88,8 @@ impl Pass {
 /// On a closed surface the closest point determines whether a node is inside. A surface that is given in part, or a
 /// body thinner than the possible penetration, needs the normals of the nodes as well: [`facing`](Self::facing). If
 /// the surface of the nodes is known, a node behind a facet is in contact with it only up to half of the material
-/// that may lie between: the thickness of its own body plus that of the other, in the reference configuration. So
-/// there is no contact through thin bodies, if their whole surfaces are given.
+/// that may lie between: the sum of the thicknesses of both bodies in the reference configuration. So there is no
+/// contact through thin bodies, if their whole surfaces are given.
 ///
 /// # Identity
 ///
@@ -346,7 +346,6 @@ impl<T: Real> NodeToFacet<T> {
         (2 * rows, 2 * entries)
     }
 
-    /// The size of the smallest facet of all passes.
     fn finest(&self) -> f64 {
         let own = self.own_surface.as_ref().map_or(f64::INFINITY, Surface::finest);
         self.surface.finest().min(own)

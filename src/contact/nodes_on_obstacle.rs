@@ -34,7 +34,6 @@ impl<T: Real, const D: usize> Node<T, D> {
     }
 }
 
-/// Friction coefficient at a position in space.
 type Roughness<'a, T, const D: usize> = Box<dyn Fn([T; D]) -> f64 + Send + 'a>;
 
 /// Velocity and acceleration of a point of the obstacle's surface at t.
@@ -82,7 +81,6 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     roughness: Option<Roughness<'a, T, D>>,
     drag: Option<Drag<'a, T, D>>,
     rows: Vec<Row<T, D>>,
-    /// Rows of the previous search.
     before: Vec<Row<T, D>>,
 }
 
@@ -111,8 +109,8 @@ impl<T: Real, const D: usize> Row<T, D> {
         self.distance + dot(self.own_normal, minus(place, self.place))
     }
 
-    /// Distance and normal of a point in the frame of the obstacle. For a point on the other side of the obstacle
-    /// those of the tangent plane, so that a node cannot pass through undetected.
+    /// Distance and normal of a point in the frame of the obstacle. For a point on the other side of the obstacle the
+    /// tangent plane is used, so that a node cannot pass through undetected.
     fn seen_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
         let (distance, normal) = obstacle.distance(place);
         match dot(normal, self.own_normal) > T::zero() {

@@ -75,7 +75,6 @@ pub struct Passage<T> {
     pub steepness: T,
 }
 
-/// The first passage of a path through a body of any shape.
 fn trace<T: Real, const D: usize>(
     distance: impl Fn([T; D]) -> (T, [T; D]),
     from: [T; D],
@@ -381,9 +380,9 @@ pub(super) fn across<T: Real, const D: usize>(normal: [T; D]) -> [[T; D]; 2] {
     if D == 2 {
         (directions[0][0], directions[0][1]) = (normal[1], -normal[0]);
     } else if D == 3 {
-        // The first axis at a sufficient angle from the normal; one of three always has it. The limit is not reached
-        // at a symmetric position. The axis at the largest angle would be a bad choice: on a flat surface rounding
-        // would decide which one it is, and the tangents would jump while a normal is iterated.
+        // The first axis at a sufficient angle from the normal, which one of three always has; symmetric normals are
+        // not at the limit. The axis at the largest angle would not do: on a flat surface rounding would decide which
+        // one it is, and the tangents would jump while a normal is iterated.
         let axis = (0..D).find(|&axis| normal[axis].abs() < T::of(0.61)).unwrap_or(0);
         let mut first: [T; D] = std::array::from_fn(|k| -normal[axis] * normal[k]);
         first[axis] += T::one();

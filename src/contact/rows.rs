@@ -121,7 +121,6 @@ impl<T: Real> ContactJacobian<T> {
         self.normals = other.normals;
     }
 
-    /// Appends a row of another matrix.
     pub(crate) fn push_row(&mut self, other: &Self, row: usize) {
         let range = other.pointers[row]..other.pointers[row + 1];
         self.dofs.extend_from_slice(&other.dofs[range.clone()]);
@@ -144,7 +143,6 @@ impl<T: Real> ContactJacobian<T> {
         }
     }
 
-    /// Number of weights of all rows.
     pub(crate) fn entries(&self) -> usize {
         self.dofs.len()
     }

@@ -46,12 +46,10 @@ pub(crate) use vicinity::Vicinity;
 use shape::{RIM, Rim};
 
 /// Largest penetration that is recovered in a step, as a share of the smallest facet or edge. A body at a typical
-/// impact speed, a thousandth of the wave speed, moves ten times as far in a step. Faster recovery would throw it
-/// off.
+/// impact speed, a thousandth of the wave speed, moves ten times as far in a step. Faster recovery would throw it.
 pub(crate) const RECOVERY: f64 = 1e-4;
 
-/// A surface of one or more parts, made of facets: the input of constraints between surfaces, and of output on
-/// surfaces.
+/// A surface of one or more parts, made of facets: the input of constraints between surfaces and of output.
 ///
 /// It is built from facets ([`new`](Self::new)) or from the outer sides of a mesh of cells
 /// ([`of_cells`](Self::of_cells)). Both check the sides, the orientation and the areas of the facets. Constraints
@@ -111,7 +109,6 @@ impl Surface {
         self.typical
     }
 
-    /// The boxes of its facets.
     pub(crate) fn boxes(&self, positions: &[Point]) -> impl Iterator<Item = Bounds> + Clone {
         self.facets.iter().map(|facet| Bounds::of_corners(&facet.shape(positions)))
     }
@@ -136,8 +133,7 @@ impl Surface {
         self.nodes.partition_point(|&other| other < node)
     }
 
-    /// The places of the vertices of a facet in [`nodes`](Self::nodes); entries behind its last vertex have no
-    /// meaning.
+    /// The places of the vertices of a facet in [`nodes`](Self::nodes); later entries have no meaning.
     pub(crate) fn places(&self, facet: usize) -> &[usize; 4] {
         &self.places[facet]
     }
@@ -201,7 +197,6 @@ impl Surface {
         self.corners_at(self.places[facet][k]).iter().map(|&(facet, _)| facet)
     }
 
-    /// The facets around a node.
     pub(crate) fn facets_around(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
         self.corners_around(node).map(|(facet, _)| facet)
     }

@@ -17,7 +17,6 @@ pub(crate) struct Tangents {
 }
 
 impl Tangents {
-    /// Removes all contacts.
     pub(crate) fn clear(&mut self) {
         self.first.clear();
         self.friction.clear();
@@ -58,12 +57,10 @@ impl Tangents {
         self.owners.is_empty()
     }
 
-    /// Number of tangential rows.
     pub(crate) fn len(&self) -> usize {
         self.owners.len()
     }
 
-    /// The tangential rows of a contact.
     pub(crate) fn of(&self, contact: usize) -> Range<usize> {
         match self.first.get(contact..contact + 2) {
             Some(&[start, end]) => start..end,
@@ -71,17 +68,14 @@ impl Tangents {
         }
     }
 
-    /// All tangential rows.
     pub(crate) fn all(&self) -> Range<usize> {
         self.contacts..self.contacts + self.owners.len()
     }
 
-    /// The friction coefficient of a contact.
     pub(crate) fn friction(&self, contact: usize) -> f64 {
         self.friction.get(contact).copied().unwrap_or(0.0)
     }
 
-    /// The contacts that have friction.
     pub(crate) fn contacts(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.friction.len()).filter(|&contact| !self.of(contact).is_empty())
     }

@@ -79,7 +79,6 @@ pub struct Tie<T: Real> {
     reach: f64,
     joint: Joint,
     rows: AffineRows<T>,
-    /// The previous rows.
     before: AffineRows<T>,
     /// For each row its tied node, by place, and its axis.
     listed: Vec<(usize, usize)>,

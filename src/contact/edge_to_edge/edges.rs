@@ -64,7 +64,6 @@ impl Edge {
         edges
     }
 
-    /// The two adjacent facets.
     pub(super) fn facets(&self) -> [usize; 2] {
         self.sides.map(|(facet, _)| facet)
     }

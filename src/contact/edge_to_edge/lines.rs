@@ -110,7 +110,6 @@ impl Ways {
         Self { from, by }
     }
 
-    /// The edges at τ.
     pub(super) fn at(&self, share: f64) -> [Ends; 2] {
         [0, 1].map(|k| [0, 1].map(|end| add_scaled(self.from[k][end], share, self.by[k][end])))
     }
@@ -144,7 +143,6 @@ impl Ways {
         })
     }
 
-    /// Coefficients of the cubic.
     fn cubic(&self) -> [f64; 4] {
         let pair = |ends: [Ends; 2]| (sub(ends[0][1], ends[0][0]), sub(ends[1][1], ends[1][0]));
         let ((d, c), (dd, dc)) = (pair(self.from), pair(self.by));

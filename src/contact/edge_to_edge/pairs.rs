@@ -32,7 +32,6 @@ const DEEPEST: f64 = 0.25;
 const UNFORESEEN: f64 = 0.1;
 const LARGEST_TURN: f64 = 0.5;
 
-/// Edges of two surfaces.
 #[derive(Clone, Copy)]
 pub(super) struct Pair<'a> {
     pub(super) edges: [&'a Edge; 2],
@@ -71,7 +70,6 @@ impl Pair<'_> {
         self.radii().into_iter().zip(crossing.shares).map(between).sum()
     }
 
-    /// The gap of the lines less the radii.
     pub(super) fn clear(&self, crossing: &Crossing) -> f64 {
         crossing.gap - self.offsets.factor * self.radius(crossing)
     }
@@ -159,9 +157,9 @@ impl Pair<'_> {
         (x > 0.0).then(|| (edge, [value[0], value[1] / (x + w).powi(2), value[2] / (x + w).powi(3)]))
     }
 
-    /// The gap of the edges, and its derivatives with respect to the positions of the four ends: those of the lines
-    /// if the closest points are on the edges. Beyond an end the gap opens, slowly at first, so that both are
-    /// continuous.
+    /// The gap of the edges, and its derivatives with respect to the positions of the four ends. If the closest
+    /// points are on the edges, both equal the values of the lines. Beyond an end the gap opens, slowly at first, so
+    /// that both are continuous.
     pub(super) fn row(&self, crossing: &Crossing, at: &impl Fn(usize) -> Point) -> (f64, [Point; 4]) {
         let mut row = crossing.weights().map(|weight| crossing.normal.map(|x| weight * x));
         let (opening, slopes) = self.by_shares(crossing);

@@ -26,12 +26,10 @@ impl<T: Real> Bonds<T> {
         Self { tie, strength, holds, changed: false }
     }
 
-    /// Whether a node of the slave is bonded.
     pub(super) fn hold(&self, place: usize) -> bool {
         self.holds[place]
     }
 
-    /// The ties of the bonded nodes.
     pub(super) fn tie(&self) -> &Tie<T> {
         &self.tie
     }

@@ -108,7 +108,6 @@ impl Sums {
         self.offset / self.area
     }
 
-    /// The mean of the covered points.
     pub(super) fn position(&self) -> Point {
         self.position.map(|x| x / self.area)
     }
@@ -131,7 +130,6 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// The derivative of the mean gap.
     pub(super) fn weight(&self, sums: &Sums) -> Point {
         add_scaled(self.moment, -sums.gap(), self.area).map(|x| x / sums.area)
     }

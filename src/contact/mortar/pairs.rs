@@ -17,7 +17,6 @@ pub(super) struct Pairs {
 }
 
 impl Pairs {
-    /// No pairs.
     pub(super) fn clear(&mut self) {
         self.near.clear();
         self.starts.clear();

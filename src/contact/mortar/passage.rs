@@ -15,7 +15,6 @@ const FINE: f64 = 0.125;
 /// Largest number of checks in a step. Faster surfaces are rejected if they pass through each other's box.
 const LOOKS: u32 = 512;
 
-/// Work space for the check of a step.
 #[derive(Debug, Default)]
 pub(super) struct Look {
     ends: [Vec<Point>; 2],

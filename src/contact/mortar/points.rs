@@ -13,7 +13,6 @@ pub(super) fn column(moment: Point, area: Point, share: f64) -> Column {
     [moment[0], moment[1], moment[2], area[0], area[1], area[2], share, 0.0]
 }
 
-/// Adds a column to another one.
 #[inline]
 pub(super) fn add(sum: &mut Column, column: &Column) {
     sum.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
@@ -28,7 +27,6 @@ pub(super) const OWN: usize = 0;
 pub(super) const OTHERS: usize = 4;
 pub(super) const NORMAL: usize = 8;
 
-/// Quadrature points of a pair of facets.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     /// The shape functions of the slave facet's corners, and the addends that they multiply.

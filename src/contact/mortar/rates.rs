@@ -6,7 +6,6 @@ use crate::contact::GapRates;
 use crate::contact::surface::{Point, SecondDifference};
 use crate::real::Real;
 
-/// Work space for rates.
 #[derive(Debug, Default)]
 pub(super) struct Rates {
     integrals: Integrals,

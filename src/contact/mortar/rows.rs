@@ -26,12 +26,10 @@ pub(super) struct Made<'a, T> {
     pub(super) u: &'a [T],
 }
 
-/// Position and area of a contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spot {
     pub(super) position: Point,
     pub(super) normal: Point,
-    /// The covered area of the node.
     pub(super) area: f64,
     /// The mean offset of the two surfaces at full size, and its factor in the gap.
     pub(super) offset: f64,

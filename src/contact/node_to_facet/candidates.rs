@@ -171,7 +171,6 @@ fn beside_of(pass: usize, facet: usize) -> usize {
     pass + 2 * (1 + facet)
 }
 
-/// The pass of a candidate.
 pub(super) fn pass_of(candidate: usize) -> usize {
     candidate % 2
 }

@@ -12,7 +12,7 @@ use crate::real::Real;
 const FINE: f64 = 0.125;
 
 /// The same limit for two checks of nodes with rows: whether they went through a facet, and along which normal they
-/// were stopped. At smaller displacements a row lets its node in only over an edge, where the normal is not unique.
+/// were stopped. Below it a row lets its node in only over an edge, where the normal is not unique.
 const COARSE: f64 = 0.6;
 
 /// Share of a path that may enter over a convex corner and leave again.

@@ -6,7 +6,6 @@ use crate::real::Real;
 
 use super::super::obstacle::{dot, minus};
 
-/// The motion set by the host.
 pub(super) enum Motion<'a, T, const D: usize> {
     Rest,
     /// Displacement at t, its velocity and its acceleration.

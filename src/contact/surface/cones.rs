@@ -46,7 +46,6 @@ impl Cone {
     }
 }
 
-/// The cones of the facets of a surface.
 #[derive(Debug, Default)]
 pub(crate) struct Cones {
     of_facets: Vec<Cone>,
@@ -77,8 +76,7 @@ impl Cones {
     }
 
     /// Whether the normals of all facets that share a vertex with a facet surely differ from its normals by less than
-    /// the angle with this sine. The facets are extended beyond their sides by a share of their size plus the length
-    /// `way`.
+    /// the angle with this sine, with facets extended beyond their sides by a share of their size plus `way`.
     pub(super) fn is_even(&self, surface: &Surface, facet: usize, sine: f64, (share, way): (f64, f64)) -> bool {
         let places = &surface.places(facet)[..surface.facets()[facet].nodes().len()];
         let is_even = |&place: &usize| self.spreads[place] < (1.0 - ROUNDING) * sine;

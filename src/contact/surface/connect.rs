@@ -92,7 +92,6 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Finds the neighbor across each side.
     fn connect(&mut self) -> Result<()> {
         let dimension = self.dimension;
         // (smaller node, larger node, facet, side, whether the side runs from the smaller to the larger node)

@@ -10,14 +10,14 @@ const NEAR: f64 = 0.25;
 /// Extension of the facets of a dent as planes beyond their sides within a step, as a share of the facet.
 const BEYOND: f64 = 1.0;
 
-/// Sine of the smallest angle between two sides of a dent. In a flatter dent, a node that slides over the bottom
-/// penetrates by at most its displacement times this sine. Two nearly parallel rows would not determine their forces.
+/// Sine of the smallest angle between two sides of a dent. In a flatter dent, a sliding node penetrates by at most
+/// its displacement times this sine, and two nearly parallel rows would not determine their forces.
 const LEAST_SINE: f64 = 0.05;
 
 impl Ground<'_> {
     /// The projections of a node onto the other sides of the dent in which it is, or which it may enter by a
-    /// displacement of length `way`. These sides share a vertex with its own facet and rise from there. Each has its
-    /// own normal.
+    /// displacement of length `way`. These sides share a vertex with its facet and rise from there. Each has its own
+    /// normal.
     pub(crate) fn beside<'a>(&'a self, stand: &'a Stand, way: f64) -> impl Iterator<Item = Stand> + 'a {
         let Self { surface, positions, .. } = *self;
         let nodes = surface.facets()[stand.facet].nodes();
@@ -104,9 +104,9 @@ impl Ground<'_> {
         self.on_plane(stand.place, stand.facet, BEYOND)
     }
 
-    /// The update of the k-th projection of a node whose closest projection now is `closest`. A single projection
-    /// moves to the closest one. Of several in a dent, the one on the closest facet or else the nearest one moves
-    /// there; the others stay on their facets.
+    /// The update of the k-th projection of a node, whose closest projection is now `closest`. A single projection
+    /// moves there. Of several in a dent, the one on the closest facet or else the nearest one moves there; the
+    /// others stay on their facets.
     pub(crate) fn followed(&self, stands: &[Stand], k: usize, closest: Option<Stand>) -> Option<Stand> {
         let stand = &stands[k];
         if stands.len() == 1 {

@@ -4,9 +4,9 @@
 //! 1, x and s t. A polynomial rule integrates all but ∫ s t dA exactly, because s t is not a polynomial of x. By
 //! Green's theorem that integral is ∮ Q dt around a part, with ∂Q/∂s = s t J and the Jacobian J of the coordinates,
 //! which is linear in s and t. Along the sides of the quadrilateral Q dt is a polynomial, which Gauss' rule
-//! integrates exactly. Along a cut it is not, but the part on the other side of the cut has the opposite error. So
-//! sums over all parts are exact, and so are the nodal forces of a constant pressure. The weights of the rule are
-//! changed as little as possible to match the integral while ∫ dA and ∫ x dA stay.
+//! integrates exactly. Along a cut it is not, but the parts on both sides have opposite errors. So sums over all
+//! parts are exact, and so are the nodal forces of a constant pressure. The weights of the rule are changed as little
+//! as possible to match the integral while ∫ dA and ∫ x dA stay.
 
 use super::overlap::Flat;
 
@@ -42,7 +42,6 @@ pub(super) struct RulePoint {
     pub(super) master: [f64; 4],
 }
 
-/// The points of a rule on a polygon.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RulePoints {
     points: [RulePoint; MOST],
@@ -127,7 +126,6 @@ impl RulePoints {
     }
 }
 
-/// Values at the points of a rule.
 type Function = [f64; MOST];
 
 fn cross([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {

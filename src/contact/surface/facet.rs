@@ -87,7 +87,6 @@ impl Facet {
         &self.nodes[..self.count]
     }
 
-    /// The facet with its vertices at the positions of its nodes.
     #[inline]
     pub(crate) fn shape(&self, positions: &[Point]) -> Shape {
         let [a, b, c, d] = self.nodes;

@@ -23,7 +23,6 @@ impl Kin {
         Self { own: around(surface, rings), beside }
     }
 
-    /// Whether a node is never in contact with a facet.
     pub(crate) fn keeps_apart(&self, place: usize, facet: usize) -> bool {
         self.own.holds(place, facet)
     }

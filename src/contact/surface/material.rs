@@ -26,7 +26,6 @@ const ROUNDING: f64 = 1e-6;
 /// The body of each facet, and the largest depth of contact from the material behind each node.
 #[derive(Debug)]
 pub(crate) struct Material {
-    /// The body of each facet.
     bodies: Vec<usize>,
     /// Largest depth of contact, by place of the node in the surface.
     depths: Vec<f64>,
@@ -47,8 +46,7 @@ impl Material {
     }
 
     /// Measures the thickness at a node as its distance to the closest facet of the same body that it is behind, of
-    /// the facets `near` it. A body must not penetrate itself by more than the `overlap` of surfaces with negative
-    /// offsets.
+    /// the facets `near` it. A body must not penetrate itself, except by the `overlap` of negative offsets.
     pub(super) fn new(
         surface: &Surface,
         near: &Neighborhood,

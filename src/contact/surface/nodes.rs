@@ -33,7 +33,6 @@ pub(crate) struct Nodes {
     list: DofList,
     /// Nodes of the two bodies. A body in contact with itself is listed twice.
     bodies: [Vec<usize>; 2],
-    /// The current positions of the nodes of the two bodies.
     pub(crate) positions: Vec<Point>,
     /// Number of changes of the positions: while it is the same, so are the positions.
     moves: usize,
@@ -98,12 +97,10 @@ impl Nodes {
         }
     }
 
-    /// The nodes of the two bodies, each ascending.
     pub(crate) fn bodies(&self) -> &[Vec<usize>; 2] {
         &self.bodies
     }
 
-    /// The dofs of the constraint.
     pub(crate) fn dofs(&self) -> &[usize] {
         self.list.as_slice()
     }

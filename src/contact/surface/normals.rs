@@ -79,8 +79,8 @@ impl Surface {
     }
 
     /// Whether a point at `arm` from a side or a vertex of a facet is in front of one of the facets there, while the
-    /// others lie behind that facet. Then the point is outside even if it is behind the mean normal. Such points
-    /// occur because facets with nearer closest points may be excluded for the node.
+    /// others lie behind that facet. Then it is outside even if it is behind the mean normal. Such points occur
+    /// because facets with nearer closest points may be excluded for the node.
     fn is_outside(&self, facet: usize, location: Location, arm: Point, positions: &[Point]) -> bool {
         /// Least height of the point in front of the facet, as a share of the facet. Nearly flush edges count as one
         /// surface.

@@ -31,7 +31,6 @@ impl Thickness {
         self.by_node.is_empty()
     }
 
-    /// The offsets at t.
     pub(crate) fn at(&self, t: f64) -> Offsets<'_> {
         Offsets { by_node: &self.by_node, factor: self.ramp.at(t) }
     }
@@ -85,7 +84,7 @@ impl Offsets<'_> {
         facet.nodes.map(|node| self.of(node))
     }
 
-    /// The offset of a node plus that of a facet at the point with these shape functions, without the factor.
+    /// The offset of a node plus the offset of a facet at the point with these shape functions, without the factor.
     pub(crate) fn upon(&self, node: usize, facet: &Facet, weights: &[f64; 4]) -> f64 {
         if self.is_none() {
             return 0.0;

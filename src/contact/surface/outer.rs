@@ -133,7 +133,6 @@ impl<'c> Cell<'c> {
         Ok(Self { turned, ..cell })
     }
 
-    /// The nodes of corners.
     fn at(&self, corners: &[usize]) -> Vec<usize> {
         corners.iter().map(|&corner| self.nodes[corner]).collect()
     }

@@ -40,14 +40,14 @@ impl Surface {
     }
 
     /// The pressure (force/area, compression positive) at each of its [`nodes`](Self::nodes) from the given forces:
-    /// −f·A/|A|² with A = ∫ N n dA over the face at the node, n outward. [`shears`](Self::shears) returns the rest of
-    /// the force. A face is a set of facets around the node whose normals differ by less than 37°.
+    /// −f·A/|A|² with A = ∫ N n dA over the face at the node, n outward. [`shears`](Self::shears) returns the rest. A
+    /// face is a set of facets around the node whose normals differ by less than 37°.
     ///
-    /// An edge or corner has several faces. Only faces that have a facet all of whose nodes bear a force count;
-    /// without any such facet, all faces count. Pressures p_k ≥ 0 on them are fitted to the force, f ≈ −Σ p_k A_k,
-    /// and the node gets the pressure of the face with the largest force. So the pressure on one side of a body holds
-    /// at its rim and corners too, and a pressure that is uniform all over a body is reproduced. On facets of second
-    /// order the nodes in the middle bear most of a pressure; there f is redistributed to the linear parts first.
+    /// An edge or corner has several faces. Only faces with a facet all of whose nodes bear a force count; if there
+    /// is none, all faces count. Pressures p_k ≥ 0 on them are fitted to the force, f ≈ −Σ p_k A_k, and the node gets
+    /// the pressure of the face with the largest force. So the pressure on one side of a body holds at its rim and
+    /// corners too, and a uniform pressure all over a body is reproduced. On facets of second order the nodes in the
+    /// middle bear most of a pressure; there f is redistributed to the linear parts first.
     ///
     /// `positions` and `forces` hold the values of all nodes of the mesh;
     /// [`contact_forces`](crate::Simulation::contact_forces) returns contact forces. Where the contact zone ends
@@ -125,7 +125,8 @@ impl Surface {
         faces
     }
 
-    /// Redistributes the forces from the nodes of facets of second order to those of the linear parts. The sum stays.
+    /// Redistributes forces from the nodes of facets of second order to the nodes of their linear parts. The sum
+    /// stays.
     fn on_parts(&self, forces: Vec<Point>, loaded: &[bool], positions: &[Point]) -> Vec<Point> {
         if self.facets.iter().all(|facet| facet.whole.is_none()) {
             return forces;

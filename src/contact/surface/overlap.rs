@@ -21,8 +21,7 @@ pub(crate) struct Sample {
     /// The distance from slave to master along the slave facet's normal: negative where they penetrate each other.
     pub(crate) gap: f64,
     /// ν/(ν · n), with the normal ν of the master facet there and the normal n of the slave facet. The gap changes by
-    /// minus its product with the motion of the slave point, and by plus its product with the motion of the master
-    /// point.
+    /// its product with the motion of the master point relative to the slave point.
     pub(crate) direction: Point,
 }
 
@@ -93,8 +92,8 @@ impl Base {
         Some(base)
     }
 
-    /// Stores the facets behind sharp edges of this one, so that there is no contact through the body: points that
-    /// have penetrated one of these facets, or lie behind it, are not below this facet.
+    /// Stores the facets behind sharp edges, so that there is no contact through the body: points that have
+    /// penetrated one of these, or lie behind it, are not below this facet.
     ///
     /// `normals` are the normals at the middles of all facets.
     pub(crate) fn see_beside(
@@ -123,8 +122,8 @@ impl Base {
     /// Whether a master facet belongs to facets behind sharp edges: with more than half of the area that it covers
     /// here, or with all corners if it covers nothing.
     ///
-    /// Each search decides this for the facet as a whole. Decided point by point at each relinearization, points
-    /// appeared and disappeared with the contact forces, and the iteration did not converge.
+    /// Each search decides this for the whole facet. Decided point by point at each relinearization, points appeared
+    /// and disappeared with the contact forces, and the iteration did not converge.
     pub(crate) fn has_beside(&self, facet: &Facet, positions: &[Point]) -> bool {
         if self.beside.iter().all(Option::is_none) || self.lowest(facet, positions) >= 0.0 {
             return false;
@@ -283,8 +282,8 @@ impl Base {
         }
     }
 
-    /// The product t₁ × t₂ of the tangents at the point with these shape functions, and the derivatives of its
-    /// component along n, the facet's area per unit of its coordinates, by the corners. The second tangent of a
+    /// The product t₁ × t₂ of the tangents at the point with these shape functions, and the derivatives by the
+    /// corners of its component along n, the area per unit of the facet's coordinates. The second tangent of a
     /// segment is the unit vector out of plane.
     #[inline]
     pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
@@ -317,9 +316,8 @@ impl Base {
         std::array::from_fn(|k| add_scaled(tilted[k], spin * by_corner[k], self.axes[1]))
     }
 
-    /// The gradient, with respect to the slave point, of a function with these values at the corners of a master
-    /// facet, at the intersection with the ray of this facet. It lies in the facet's plane, because the ray moves
-    /// with the point.
+    /// The gradient, by the slave point, of a function with these values at the corners of a master facet, at its
+    /// intersection with the ray of this facet. It lies in the facet's plane, because the ray moves with the point.
     ///
     /// With d the vectors across n whose products with the tangents are 0 and 1, the coordinate ξ of the intersection
     /// changes by dξ = d · dx.
@@ -347,7 +345,6 @@ impl Base {
         add_scaled(across[0].map(|x| along / area * x), beside / area, across[1])
     }
 
-    /// Number of nodes.
     pub(crate) fn count(&self) -> usize {
         self.count
     }

@@ -62,8 +62,8 @@ impl Polygon {
     /// The same polygon, listed from the corner that is farthest in a fixed direction.
     ///
     /// The quadrature over the triangle fan from that corner changes smoothly with the polygon: where one corner
-    /// splits in two, a triangle without area is added. In the order of the clipping, the first corner could change,
-    /// the quadrature error would jump, and the iteration of the rows would not converge.
+    /// splits in two, a triangle without area is added. Otherwise the first corner could change, the quadrature error
+    /// would jump, and the iteration of the rows would not converge.
     #[inline]
     fn turned_to_apex(&self) -> Self {
         let height = |corner: &[f64; 2]| APEX[0] * corner[0] + APEX[1] * corner[1];

@@ -36,7 +36,6 @@ struct Seen {
 pub(crate) struct Stand {
     /// Index of the node in the list of the slave nodes.
     pub(crate) place: usize,
-    /// Index of the facet in the surface.
     pub(crate) facet: usize,
     pub(super) location: Location,
     /// Shape functions of the facet's vertices at the closest point.
@@ -64,11 +63,9 @@ pub(crate) struct Ground<'a> {
     /// The motions since the lists were built, if known; they end the search of a list early.
     pub(crate) kept: Option<Kept<'a>>,
     pub(crate) surface: &'a Surface,
-    /// The boxes of its facets, if known.
     pub(crate) boxes: Option<&'a [Bounds]>,
     /// The cones of the normals of this surface and of the nodes' own surface, if known.
     pub(crate) cones: [Option<&'a Cones>; 2],
-    /// The surface of the nodes, if known.
     pub(crate) own: Option<&'a Surface>,
     /// The facets excluded for each node, if the nodes are on this same surface.
     pub(crate) kin: Option<&'a Kin>,
@@ -142,8 +139,8 @@ impl Ground<'_> {
     /// Whether a node is so deep behind a facet that material of both bodies, or of its own body, lies between them.
     ///
     /// The sign is taken along the normal of the gap, because over a side or a vertex a node may be in front of one
-    /// facet and behind the other. If the node's own normal points along that normal, its own body with its bulging
-    /// flanks is between.
+    /// facet and behind the other. If the node's own normal points along that normal, its own body lies between,
+    /// whose flanks bulge.
     fn is_beyond(
         &self,
         place: usize,
@@ -173,8 +170,8 @@ impl Ground<'_> {
         (stand.map_or(height, |stand| height.min(stand.gap.abs())), stand)
     }
 
-    /// The distance of a node from a facet less their offsets. With the same offsets everywhere the closest facet is
-    /// the nearest one by this measure, otherwise the facet whose offset surface is closest.
+    /// The distance of a node from a facet less their offsets. The nearest facet by this measure is the one whose
+    /// offset surface is closest; with equal offsets everywhere it is the closest facet.
     fn height(&self, place: usize, facet: usize, foot: &Foot) -> f64 {
         let Offsets { factor, .. } = self.offsets;
         foot.distance - factor * self.offsets.upon(self.nodes[place], &self.surface.facets()[facet], &foot.weights)
@@ -249,8 +246,8 @@ impl Ground<'_> {
         self.own.zip(own_place).is_some_and(surely)
     }
 
-    /// The projection onto the last facet of a node, within `reach`. Its limits are wider than those of the search,
-    /// so that a node that slides over the rim or turns away finishes its step.
+    /// The projection onto the last facet of a node, within `reach`. Its limits are wider than in the search, so that
+    /// a node that slides over the rim or turns away finishes its step.
     pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
@@ -269,9 +266,9 @@ impl Ground<'_> {
         vertices.find(|(_, weight)| **weight >= 1.0 - self.rounding).map(|(&vertex, _)| vertex)
     }
 
-    /// Whether a node that is projected onto a vertex, which in turn is projected onto the node, has no row because
-    /// the vertex has it. The sharper one of the two keeps the row, because it may be in a dent and have rows there,
-    /// and because a node on a sharp corner slides off. If both are equally sharp, the first one keeps it.
+    /// Whether a node that is projected onto a vertex, which is projected onto the node, leaves the row to the
+    /// vertex. The sharper one of the two keeps the row, because it may have rows in a dent, and because a node on a
+    /// sharp corner slides off. If both are equally sharp, the first one keeps it.
     pub(crate) fn is_second(&self, stand: &Stand, pass: usize) -> bool {
         /// Differences of sines below this are rounding.
         const ROUNDING: f64 = 1e-6;
@@ -324,7 +321,7 @@ fn faces((shape, foot): &(Shape, Foot), own_normal: Option<Point>, same_side: f6
 }
 
 /// Whether a point is in front of the inside of a facet, or behind it by at most a typical penetration. Then they are
-/// in contact even beside the point's own body.
+/// in contact even beside the own body.
 fn is_over((shape, foot): &(Shape, Foot), p: Point) -> bool {
     /// Depth as a share of the facet.
     const PRESSED: f64 = 0.05;

@@ -54,7 +54,6 @@ impl Ramp {
         30.0 * (to - from) / (self.times[1] - self.times[0]) * (s * (1.0 - s)).powi(2)
     }
 
-    /// The factor at t.
     pub(crate) fn at(&self, t: f64) -> f64 {
         let ([from, to], s) = (self.factors, self.place(t));
         // Its first two derivatives are zero at both ends.

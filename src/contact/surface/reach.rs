@@ -23,7 +23,6 @@ impl Reach {
         Self { least, skin: None, listed: 0.0, built_at: Vec::new() }
     }
 
-    /// The least distance at which surfaces are found.
     pub(crate) fn least(&self) -> f64 {
         self.least
     }
@@ -40,7 +39,6 @@ impl Reach {
         Ok(())
     }
 
-    /// Marks the lists as invalid.
     pub(crate) fn forget(&mut self) {
         self.built_at.clear();
     }

@@ -35,7 +35,6 @@ impl Bounds {
         Self { lower, upper }
     }
 
-    /// The smallest box that holds both.
     fn with(&self, other: &Self) -> Self {
         Self::of_points([self.lower, self.upper, other.lower, other.upper])
     }
@@ -68,7 +67,6 @@ impl Bounds {
         norm([one(0), one(1), one(2)])
     }
 
-    /// The longest side of the box.
     #[inline]
     pub(super) fn extent(&self) -> f64 {
         (0..3).map(|i| self.upper[i] - self.lower[i]).fold(0.0, f64::max)

@@ -150,9 +150,8 @@ impl Whole {
 
     /// The shares of the force on a node of the part that move to the other nodes if linear parts bear the pressure.
     ///
-    /// With these shares the shape functions of nodes in the middle give to their neighbors until the integral of
-    /// each equals that of the linear shape function on the parts. So a constant pressure makes forces in proportion
-    /// to the areas.
+    /// With these shares the shape functions of nodes in the middle give to their neighbors until each integral
+    /// equals that of the linear shape function: a constant pressure makes forces in proportion to the areas.
     pub(super) fn given(&self, corner: usize) -> ByNode {
         let order = self.order();
         let at = order[corner];
@@ -182,7 +181,7 @@ impl Whole {
         })
     }
 
-    /// The shape functions of the whole facet at the point where those of the part are `weights`.
+    /// Its shape functions where the shape functions of the part are `weights`.
     pub(crate) fn shapes(&self, weights: &[f64; 4]) -> ByNode {
         let at = self.place(weights);
         let mut shapes = [0.0; MOST];
@@ -192,16 +191,15 @@ impl Whole {
         shapes
     }
 
-    /// The shape functions of the whole facet less those of the part. They are zero at all nodes, and their sum is
-    /// zero.
+    /// Its shape functions less the ones of the part. They are zero at all nodes, and their sum is zero.
     pub(crate) fn excess(&self, weights: &[f64; 4]) -> ByNode {
         let mut excess = self.shapes(weights);
         excess.iter_mut().zip(&weights[..self.own()]).for_each(|(shape, weight)| *shape -= weight);
         excess
     }
 
-    /// The derivatives of [`excess`](Self::excess) with respect to the coordinates of the part; `by` are the
-    /// derivatives of the part's own shape functions.
+    /// The derivatives of [`excess`](Self::excess) by the coordinates of the part, given the derivatives `by` of the
+    /// part's own shape functions.
     pub(crate) fn excess_slopes(&self, weights: &[f64; 4], by: &[[f64; 4]; 2]) -> [ByNode; 2] {
         let at = self.place(weights);
         let mut slopes = [[0.0; MOST]; 2];

@@ -82,13 +82,11 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// The facet with 2, 3 or 4 corners.
     #[inline]
     pub(crate) fn new(corners: [Point; 4], count: usize) -> Self {
         Self { corners, count }
     }
 
-    /// Whether it is a segment.
     pub(crate) fn is_segment(&self) -> bool {
         self.count == 2
     }
@@ -109,13 +107,11 @@ impl Shape {
         sub(self.corners[self.after(k)], self.corners[k])
     }
 
-    /// Its corners.
     #[inline]
     pub(crate) fn corners(&self) -> &[Point] {
         &self.corners[..self.count]
     }
 
-    /// A corner.
     #[inline]
     pub(crate) fn corner(&self, k: usize) -> Point {
         self.corners[k]
@@ -134,13 +130,11 @@ impl Shape {
         self.square_of_size().sqrt()
     }
 
-    /// Its square.
     #[inline]
     pub(super) fn square_of_size(&self) -> f64 {
         (0..self.count).map(|k| dot(self.side(k), self.side(k))).fold(0.0, f64::max)
     }
 
-    /// Lower and upper corner of the bounding box.
     #[inline]
     pub(crate) fn bounds(&self) -> [Point; 2] {
         let [mut lower, mut upper] = [self.corners[0]; 2];
@@ -151,7 +145,6 @@ impl Shape {
         [lower, upper]
     }
 
-    /// The mean of the corners.
     #[inline]
     pub(crate) fn middle(&self) -> Point {
         let (first, share) = (self.corners[0], 1.0 / self.count as f64);

@@ -39,8 +39,8 @@ impl Vicinity {
         self.rings.is_some()
     }
 
-    /// Finds the excluded facets and the material, unless they are known. The nodes of the two surfaces are those of
-    /// the two bodies; for a surface against itself only the first surface counts.
+    /// Finds the excluded facets and the material, unless they are known. The two bodies are the nodes of the two
+    /// surfaces; for a surface against itself only the first surface counts.
     pub(crate) fn prepare(&mut self, surfaces: &[&Surface], bodies: &[Vec<usize>; 2], coordinates: &[Point]) {
         if !self.material.is_empty() {
             return;
@@ -54,7 +54,7 @@ impl Vicinity {
     }
 
     /// The material behind the nodes of a pass, and behind its facets; none if one of them is not known. In pass 0
-    /// the facets are those of the first surface.
+    /// the first surface has the facets.
     pub(crate) fn material_of(&self, pass: usize) -> Option<[&Material; 2]> {
         match &self.material[..] {
             [itself] if self.is_of_itself() => Some([itself; 2]),
@@ -84,14 +84,12 @@ impl Vicinity {
         Ok(())
     }
 
-    /// Lets offsets change with time.
     pub(crate) fn set_ramp(&mut self, times: [f64; 2], factors: [f64; 2]) -> Result<()> {
         self.thickness.ramp = Ramp::new(times, factors)?;
         self.forget();
         Ok(())
     }
 
-    /// Sets the least distance at which surfaces are found.
     pub(crate) fn set_least<T: Real>(&mut self, reach: T) -> Result<()> {
         self.reach.set_least(reach)?;
         self.forget();

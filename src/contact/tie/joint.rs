@@ -12,7 +12,6 @@ const LEAST: f64 = 1e-6;
 /// Distance of surfaces, as a share of a facet, up to which they coincide: then rows are constant.
 const FITS: f64 = 1e-8;
 
-/// The axes of space.
 const SPACE: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The tied nodes and the data of their rows.
@@ -54,7 +53,6 @@ struct Piece {
 /// ∫ N_a N_node dA over a facet, divided by ∫ N_a dA: positive for nodes of the master.
 #[derive(Clone, Copy, Debug)]
 struct Term {
-    /// Corner a of the facet.
     corner: usize,
     node: usize,
     /// The slot of the node in the rows of a.
@@ -86,7 +84,6 @@ impl Joint {
         joint
     }
 
-    /// The place of a node among the tied nodes.
     fn place(&self, node: usize) -> Option<usize> {
         self.tied.binary_search(&node).ok()
     }
@@ -244,7 +241,6 @@ impl Joint {
         range.map(move |slot| (self.columns[slot], self.weights[slot][axis]))
     }
 
-    /// The direction in which its gap opens.
     pub(super) fn direction(&self, place: usize, axis: usize) -> Point {
         self.directions[place][axis]
     }
