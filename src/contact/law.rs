@@ -120,8 +120,8 @@ pub enum ContactLaw {
     ///
     /// * The force jumps to c δ̇ where bodies touch at speed, at some time within a step: errors are of first order.
     ///   [`HuntCrossley`](Self::HuntCrossley) has no jump.
-    /// * A mass m that impacts at the speed v leaves with e v, for any v. With ξ = c/(2 √(k m)) < 1 it is e = exp(−ξ
-    ///   φ/√(1 − ξ²)), cos φ = 2 ξ² − 1.
+    /// * A mass m that impacts at the speed v leaves with e v, for any v. With ξ = c/(2 √(k m)) < 1 this is
+    ///   e = exp(−ξ φ/√(1 − ξ²)), cos φ = 2 ξ² − 1.
     /// * [`Works::contact`](crate::Works::contact) has the work of the spring, −½ k δ²;
     ///   [`Works::damping`](crate::Works::damping) has the rest of the work of contact forces.
     ///

@@ -36,9 +36,9 @@ impl Pass {
 /// dimensions, triangles and bilinear quadrilaterals in three. There are two passes, except in a
 /// [`one_pass`](Self::one_pass) contact.
 ///
-/// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface, `g = n ·
-/// (x_s − Σ N_i x_i)` (length; positive outside). Its row of G is n on the dofs of the node and −N_i n on the dofs of
-/// the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and
+/// The gap of a node at x_s is its signed distance from the closest point Σ N_i x_i of the other surface (length;
+/// positive outside), `g = n · (x_s − Σ N_i x_i)`. Its row of G is n on the dofs of the node and −N_i n on the dofs
+/// of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and
 /// angular momentum at the configuration of the search (up to lever arms of √ε of a facet on its sides, see below).
 /// Nodes at a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
 ///
@@ -154,10 +154,11 @@ impl<T: Real> NodeToFacet<T> {
     ///
     /// Two passes treat both surfaces alike. They pass the patch test on meshes that do not match; [one
     /// pass](Self::one_pass) fails it where the nodes are coarser than the facets. Normals of both surfaces are
-    /// compared as in [`facing`](Self::facing). If two nodes are at the same point, only the first pass makes a row.
-    /// Where a flat interface closes as a whole there are more rows than independent gaps: then the multipliers have
-    /// the least norm. On curved surfaces the gaps of both passes cannot all be zero; neither surface penetrates. The
-    /// second pass costs one row for each node of `other`, in the search and in the contact problem.
+    /// compared as in [`facing`](Self::facing). Of two nodes that are each other's closest points the sharper one has
+    /// a row, or else the one of the first pass. Where a flat interface closes as a whole there are more rows than
+    /// independent gaps: then the multipliers have the least norm. On curved surfaces the gaps of both passes cannot
+    /// all be zero; neither surface penetrates. The second pass costs one row for each node of `other`, in the search
+    /// and in the contact problem.
     ///
     /// `coordinates` are the reference coordinates of all nodes of a mesh, in two or three dimensions, and `dofs` the
     /// dofs of their displacements. Facets list nodes by their index there; nodes of no facet are not read later. The
@@ -267,9 +268,9 @@ impl<T: Real> NodeToFacet<T> {
     /// reference configuration, up to two reaches or two facets away, unless the node is in front of them.
     ///
     /// Facets connected through shared nodes belong to one body. So do the hollows in it: closed parts whose normals
-    /// point into them. Of two nodes at the same point the sharper one has a row, or else the one with the smaller
-    /// index. The search range includes the largest relative motion of any two nodes of the surface within the step.
-    /// For a body that spins fast it is larger than necessary.
+    /// point into them. Of two nodes that are each other's closest points the sharper one has a row, or else the one
+    /// with the smaller index. The search range includes the largest relative motion of any two nodes of the surface
+    /// within the step. For a body that spins fast it is larger than necessary.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
