@@ -1,4 +1,4 @@
-//! Contact problems, and the seam for their solvers.
+//! Contact problems and the trait of their solvers.
 
 mod acceptance;
 mod active_set;
@@ -27,10 +27,10 @@ pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;
 
-/// Rows for which memory is reserved at build. More are rare, and get it when they first press.
+/// Number of rows for which memory is reserved at build; larger problems get memory at their first solve.
 pub(crate) const FORESEEN: usize = 128;
 
-/// Rows from which on nothing may cost their cube, nor a solve each where solves are needed again and again.
+/// From this many rows on, cubic cost is avoided, and so is one solve per row in repeated assemblies.
 pub(crate) const MANY: usize = 256;
 
 /// A solver of [`ContactProblem`]s.
@@ -48,21 +48,21 @@ pub(crate) const MANY: usize = 256;
 /// assert!((problem.gap(1, &lambda) - 2.0).abs() < 1e-15); // the second contact is pushed open
 /// ```
 pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
-    /// Whether the solver takes blocks of a set: a simulation refuses contact laws that need another one. Default: all
-    /// sets of one row.
+    /// Whether the solver handles blocks of a set; building a simulation fails for contact laws that need another
+    /// one. Default: all sets of one row.
     fn admits(&self, set: AdmissibleSet) -> bool {
         set.rows() == 1
     }
 
-    /// Announces problems of up to `size` rows: a solver that allocates no memory in [`solve`](Self::solve) reserves it
-    /// now. Called at build, and before the first problem with more rows than were announced; then for up to twice as
-    /// many. Default: nothing is reserved.
+    /// Announces problems of up to `size` rows: a solver that allocates no memory in [`solve`](Self::solve) reserves
+    /// it here. Called at build, and before the first problem with more rows than announced, then for up to twice as
+    /// many. Default: reserves no memory.
     fn reserve(&mut self, size: usize) {
         let _ = size;
     }
 
-    /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are taken as active first) and the solution on
-    /// exit. The guess may change the work, never the result beyond rounding. Returns the number of iterations.
+    /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are first taken as active) and the solution on
+    /// exit. The guess may change the work, but the result only within rounding. Returns the number of iterations.
     ///
     /// # Errors
     ///
@@ -73,9 +73,9 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>>;
 
-    /// Solves a problem whose W is known by its products alone, as [`solve`](Self::solve) does: hundreds of rows on a
-    /// body whose matrix changes with every iteration. Where this fails, or there is nothing, W is formed and
-    /// [`solve`](Self::solve) called. Default: nothing, for the solver needs entries of W.
+    /// Solves a problem with a matrix-free W, like [`solve`](Self::solve): for hundreds of rows on a body whose
+    /// matrix changes with every iteration. If this returns an error or `None`, W is formed and
+    /// [`solve`](Self::solve) called. Default: `None`, for solvers that need the entries of W.
     fn solve_applied(
         &mut self,
         problem: &mut AppliedProblem<'_, T>,

@@ -1,14 +1,14 @@
-//! When a contact problem counts as solved: the start, the acceptance rule and the failure that solvers share.
+//! Shared parts of the solvers: initial guess, acceptance rule and failure of a contact problem.
 
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> ContactProblem<'_, T> {
-    /// The rows whose entries of W across the diagonal differ most, if by more than a share of √(W_ii W_jj).
+    /// The row and column of the largest asymmetry of W, if it exceeds a share of √(W_ii W_jj).
     pub(super) fn asymmetry(&self, share: T) -> Option<(usize, usize)> {
-        /// Rows and columns that are looked at together. What lies across the diagonal is read row by row first:
-        /// columns of a large W are lines of memory that push each other out of the cache.
+        /// Size of the tiles in which W is compared. The mirrored entries are copied row by row first, because
+        /// columns of a large W map to cache lines that evict each other.
         const TILE: usize = 32;
         let size = self.size();
         let mut worst = (share, None);
@@ -37,7 +37,7 @@ impl<T: Real> ContactProblem<'_, T> {
         worst.1
     }
 
-    /// Refuses numbers that are not finite; W need not be looked at if it is `known` to be.
+    /// Rejects values that are not finite; W is skipped if it is `known` to be finite.
     pub(super) fn check_finite(&self, known: bool) -> std::result::Result<(), ContactFailure<T>> {
         let finite = |i: &usize| self.offset[*i].is_finite() && (known || T::all_finite(self.row(*i)));
         match (0..self.size()).find(|i| !finite(i)) {
@@ -46,8 +46,8 @@ impl<T: Real> ContactProblem<'_, T> {
         }
     }
 
-    /// Refuses a W that is not symmetric. What rounding of badly conditioned responses makes of a symmetric one passes;
-    /// that little is for the acceptance rule to judge.
+    /// Rejects an unsymmetric W. Asymmetry from rounding of badly conditioned responses is tolerated here; the
+    /// acceptance rule judges its effect.
     pub(super) fn check_symmetric(&self) -> std::result::Result<(), ContactFailure<T>> {
         match self.asymmetry(T::epsilon().sqrt()) {
             Some((row, other)) => Err(ContactFailure::Unsymmetric { row, other }),
@@ -56,12 +56,12 @@ impl<T: Real> ContactProblem<'_, T> {
     }
 }
 
-/// How exactly, and how long, a solver tries.
+/// Tolerance and iteration limit of a solver.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Settings<T> {
     /// The admissible residual, as a fraction of the largest |q_i|.
     tolerance: T,
-    /// Iterations granted.
+    /// Iteration limit.
     pub(super) iterations: usize,
 }
 
@@ -84,10 +84,10 @@ impl<T: Real> Settings<T> {
         }
     }
 
-    /// Makes the guess admissible and refuses what no iteration could mend: numbers that are not finite, and rows
-    /// without W_ii whose y_i, which nothing can change, is wrong.
+    /// Makes the guess admissible. Rejects values that are not finite, and rows without W_ii whose y_i, which no
+    /// multiplier can change, is violated.
     ///
-    /// λ = 0 is the guess wherever it is a solution, so that the scale of a guess cannot outlive its cause.
+    /// The guess is replaced by λ = 0 if that is a solution, so that the magnitude of an old guess does not persist.
     pub(super) fn begin<'a>(
         &self,
         problem: &'a ContactProblem<'a, T>,
@@ -96,7 +96,7 @@ impl<T: Real> Settings<T> {
         self.begin_with(problem, false, multipliers)
     }
 
-    /// The same; W need not be looked at again if it is `known` to be finite.
+    /// The same; W is not checked again if it is `known` to be finite.
     pub(super) fn begin_with<'a>(
         &self,
         problem: &'a ContactProblem<'a, T>,
@@ -131,7 +131,7 @@ impl<T: Real> Settings<T> {
     }
 }
 
-/// Violations so small have lost their digits: motions that have died out leave nothing to be solved.
+/// Violations up to this size have lost their digits: motions that have died out need no solve.
 pub(super) fn nothing<T: Real>() -> T {
     T::min_positive_value() / T::epsilon()
 }
@@ -139,24 +139,24 @@ pub(super) fn nothing<T: Real>() -> T {
 /// The acceptance rule: in every row `|min(y_i, W_ii λ_i)|`, or `|y_i|` of a free row, is rounding or at most a given
 /// fraction of the largest |q_i|.
 ///
-/// Both sides have the unit of y and scale with the problem, so that the result does not depend on the units chosen.
-/// What counts as rounding is [bounded](Self::bears) by the problem: rows that contradict each other can be met but for
-/// the rounding of multipliers that grow beyond all bounds.
+/// Both sides have the unit of y and scale with the problem, so the result does not depend on the units. The problem
+/// [bounds](Self::bears) what counts as rounding: otherwise contradictory rows could be met within the rounding of
+/// multipliers that grow without bound.
 #[derive(Debug)]
 pub(super) struct Acceptance<'a, T> {
     problem: &'a ContactProblem<'a, T>,
     accepted: T,
-    /// A small share of the largest |q_j|/√W_jj: row j closed alone takes the energy ½ (|q_j|/√W_jj)², and by Cauchy
-    /// and Schwarz this moves row i by at most √W_ii times the root. Light bodies would move far with the energy of
-    /// heavy ones: the same share of many times the largest |q_j| bounds what they do.
+    /// A small share of the largest |q_j|/√W_jj. Row j closed alone takes the energy ½ (|q_j|/√W_jj)², which by
+    /// Cauchy and Schwarz moves row i by at most √W_ii |q_j|/√W_jj. Light bodies would move far with the energy of
+    /// heavy ones, so the same share of a multiple of the largest |q_j| is a second bound.
     reach: T,
     largest: T,
-    /// The row that failed last, asked first: far from the solution one row costs the check.
+    /// The row that failed last, checked first: far from the solution a check then costs one row.
     suspect: usize,
 }
 
 impl<T: Real> Acceptance<'_, T> {
-    /// Whether row i may miss complementarity by so much, whatever the multipliers are.
+    /// Whether row i may miss complementarity by `miss`, for any multipliers.
     pub(super) fn bears(&self, i: usize, miss: T) -> bool {
         let tolerance = self.problem.tolerance[i];
         miss <= self.accepted.max(tolerance) || {
@@ -168,7 +168,7 @@ impl<T: Real> Acceptance<'_, T> {
     pub(super) fn accepts(&mut self, multipliers: &[T]) -> bool {
         let fails = |i: &usize| {
             let miss = self.problem.miss(*i, multipliers);
-            // NaN fails both.
+            // NaN fails both comparisons.
             let fine = miss <= self.accepted || miss <= self.problem.rounding(*i, multipliers) && self.bears(*i, miss);
             !fine
         };
@@ -178,7 +178,7 @@ impl<T: Real> Acceptance<'_, T> {
         failing.is_none()
     }
 
-    /// Whether what every row misses is rounding.
+    /// Whether the residual of every row is rounding.
     pub(super) fn is_exact(&self, multipliers: &[T]) -> bool {
         (0..self.problem.size()).all(|i| {
             let miss = self.problem.miss(i, multipliers);
@@ -186,15 +186,15 @@ impl<T: Real> Acceptance<'_, T> {
         })
     }
 
-    /// Whether what every row misses is no more than a contradiction that nobody would notice: √ε of the way by which
-    /// what is asked of the others may move it.
+    /// Whether the residual of every row is a negligible contradiction: at most √ε of the motion that the other rows
+    /// may cause in it.
     pub(super) fn is_negligible(&self, multipliers: &[T]) -> bool {
-        // (`bears` grants ε^0.4.)
+        // `bears` allows ε^0.4.
         let share = T::epsilon().powf(T::of(0.1));
         (0..self.problem.size()).all(|i| self.bears(i, self.problem.miss(i, multipliers) / share))
     }
 
-    /// The failure that names the worst row.
+    /// The failure with the row of the largest residual.
     pub(super) fn failure(&self, iterations: usize, multipliers: &[T]) -> ContactFailure<T> {
         let misses = (0..self.problem.size()).map(|i| (i, self.problem.miss(i, multipliers)));
         let worse = |worst: (usize, T), x: (usize, T)| if x.1 > worst.1 || x.1.is_nan() { x } else { worst };

@@ -10,74 +10,74 @@ use crate::real::Real;
 
 /// Primal–dual active set (semismooth Newton) on the Delassus operator, safeguarded by Murty's least-index rule.
 ///
-/// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Plain,
-/// this can cycle; following Júdice and Pires (Computers & Operations Research 21, 1994) exchanges of whole blocks go
-/// on only while the number of violations falls, otherwise a single row, the last one, is exchanged until it falls
-/// again. That is finite for every positive definite W, symmetric or not (Murty's rule: for every matrix with positive
-/// principal minors). Steady contact takes one iteration, and while W and the active
-/// rows stay the same no factorization.
+/// Every iteration solves the equality problem of the active rows and exchanges all rows that violate a sign. Alone,
+/// this can cycle. Following Júdice and Pires (Computers & Operations Research 21, 1994), whole blocks are exchanged
+/// only while the number of violations falls; otherwise a single row, the last one, is exchanged until the number
+/// falls again. This terminates for every positive definite W, symmetric or not (Murty's rule: for every matrix with
+/// positive principal minors). Steady contact takes one iteration, without factorization while W and the active rows
+/// stay the same.
 ///
 /// From 256 active rows on, the equations are solved by conjugate gradients with a factorized sparse approximate
-/// inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), to the rounding of each, if no row depends on
-/// its neighbors; else by the factor. Problems whose W is applied and not formed
-/// ([`solve_applied`](ContactSolver::solve_applied)) take plain exchanges of blocks, and are given back where these do
-/// not end.
+/// inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), each to its rounding, if no row depends on
+/// its neighbors; otherwise by the factor. Problems with a matrix-free W
+/// ([`solve_applied`](ContactSolver::solve_applied)) use block exchanges only and return an error if these do not
+/// end.
 ///
-/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the multipliers are
-/// then those of least norm for the active rows, which share a force evenly. Where the exchanges do not end on such a
-/// W, the problem is solved by proximal steps, each of them a positive definite problem (Rockafellar, SIAM J. Control
-/// Optim. 14, 1976), and if these do not end, by [`Pivoting`]. Rows that contradict each other are an error that names
-/// them. What W leaves of nearly dependent rows may be rounding, on which multipliers grow beyond all bounds and
-/// pretend to meet what cannot be met: a pivot must exceed the rounding of the combination of rows that it measures,
-/// and a solution is accepted only if every row misses complementarity by less than a small share of what moves it
-/// without contact, whatever the multipliers. Rows that agree but for a small angle, and of which neither the steps nor
-/// pivoting find an exact solution, are met as well as the steps could if no row misses more than √ε of that.
+/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the active rows then
+/// get the multipliers of least norm, which share a force evenly. If the exchanges do not end on such a W, the
+/// problem is solved by proximal steps, each a positive definite problem (Rockafellar, SIAM J. Control Optim. 14,
+/// 1976), and if these do not end, by [`Pivoting`]. Contradictory rows are an error that names them. Nearly dependent
+/// rows may leave pivots of W that are rounding; multipliers could then grow without bound and seem to solve an
+/// infeasible problem. Therefore a pivot must exceed the rounding of the combination of rows that it measures, and in
+/// an accepted solution every row misses complementarity by less than a small share of its motion without contact,
+/// whatever the multipliers. If neither the proximal steps nor pivoting solve rows that differ by a small angle, the
+/// result of the steps is accepted if no row misses more than √ε of that motion.
 ///
-/// A W that is not symmetric, as by an effective matrix that is not, is factorized by LU: twice the work, and redundant
-/// rows always go the way of proximal steps.
+/// An unsymmetric W, from an unsymmetric effective matrix, is factorized by LU: this costs twice the work, and
+/// redundant rows always need proximal steps.
 ///
 /// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton
-/// iterations on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), where contacts are
-/// open, stick or slide; they begin where sweeps over the contacts ([`GaussSeidel`](super::GaussSeidel)) converge no
-/// more. Where these do not end, as on redundant rows, proximal steps follow, with a share of the diagonal that
-/// shrinks. All begin at zero: large coefficients may leave several solutions, and the guess chooses none of them.
+/// iterations on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), with the states
+/// open, stick and slip. They start where sweeps over the contacts ([`GaussSeidel`](super::GaussSeidel)) stop
+/// converging. If they do not end, as on redundant rows, proximal steps follow, with a shrinking share of the
+/// diagonal. All start at zero: large coefficients may allow several solutions, and the guess must not select one.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,
     applied: AppliedSet<T>,
-    /// Whether W, whose entries are then finite, is symmetric, and the version of which that is known.
+    /// Whether W is symmetric, and the version of W for which this is known; the entries of that W are finite.
     symmetry: (u64, Symmetry),
-    /// Where the rows of W are not zero.
+    /// The nonzero range of each row of W.
     extents: Extents,
     active: Vec<bool>,
     rows: Vec<usize>,
     solution: Vec<T>,
     violating: Vec<usize>,
-    /// y, and what of it is rounding in a row's own sum.
+    /// y, and the rounding of each row's own sum.
     y: Vec<T>,
     own: Vec<T>,
     /// A proximal problem: its diagonal shift, offset and center.
     shift: Vec<T>,
     offset: Vec<T>,
     center: Vec<T>,
-    /// Problems with friction.
+    /// Solver for problems with friction.
     cones: ConeNewton<T>,
-    /// The last resort on rows that are nearly dependent.
+    /// The last resort for nearly dependent rows.
     pivoting: Pivoting<T>,
 }
 
-/// Share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ, over ε. (More is solved for as it is
-/// given.)
+/// Share of √(W_ii W_jj), over ε, by which W_ij and W_ji of a symmetric W may differ. With a larger difference W is
+/// treated as unsymmetric.
 const ROUNDED: f64 = 4096.0;
 
-/// Block exchanges granted without progress before single ones begin.
+/// Block exchanges allowed without progress before single exchanges begin.
 const BLOCK_TRIES: usize = 3;
-/// Proximal steps, each of which shrinks what is left to do by orders of magnitude.
+/// Proximal steps; each reduces the error by orders of magnitude.
 const PROXIMAL_STEPS: usize = 60;
-/// Exchanges tried on a semidefinite W, for which they may not end.
+/// Exchanges allowed on a semidefinite W, for which they may not end.
 const SEMIDEFINITE_TRIES: usize = 30;
 
-/// How a sequence of exchanges ended.
+/// Result of a sequence of exchanges.
 enum Exchanges {
     Solved(usize),
     /// Semidefinite W: no progress after so many iterations.
@@ -93,8 +93,8 @@ enum Form {
     Proximal,
 }
 
-/// y of all rows for the multipliers `solution` of the active `rows`, and what is rounding in a row's own sum; `column`
-/// gives those of W, from the row on where they begin.
+/// Computes y of all rows for the multipliers `solution` of the active `rows`, and the rounding of each row's own
+/// sum. `column` returns the first stored row of a column of W and its entries from there on.
 fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     problem: &ContactProblem<'_, T>,
     column: impl Fn(usize) -> (usize, C),
@@ -123,13 +123,13 @@ fn judge<'p, T: Real, C: Iterator<Item = &'p T>>(
     }
 }
 
-/// Whether a miss of row i is more than rounding, that of its own sum and that of the multipliers it is coupled to.
+/// Whether a miss of row i exceeds the rounding of its own sum and of the multipliers coupled to it.
 ///
-/// A multiplier is known to the rounding of its own row, and carries it into the rows it is coupled to: a row of a body
-/// at rest beside a body under load must not be judged by its own small numbers. Of many rows rounding adds up like the
-/// steps of a random walk. (The sum of all would hide real violations among hundreds of rows in single precision.)
+/// A multiplier is known to the rounding of its own row and carries it into coupled rows: a row of a body at rest
+/// next to a loaded body must not be judged by its own small values. Over many rows rounding adds up like a random
+/// walk. The plain sum would hide real violations among hundreds of rows in single precision.
 fn exceeds_rounding<T: Real>(problem: &ContactProblem<'_, T>, own: &[T], i: usize, miss: T) -> bool {
-    // (Most rows miss nothing, and need not look at the others.)
+    // Most rows have no miss and need no look at other rows.
     miss > own[i] && {
         let carried = |j: usize| own[j] / problem.delassus(j, j);
         let others = problem.row(i).iter().enumerate().filter(|&(j, _)| j != i);
@@ -159,7 +159,7 @@ impl<T: Real> ActiveSet<T> {
         let proximal = form == Form::Proximal;
         let offset: &[T] = if proximal { offset } else { problem.offset };
         let (mut fewest, mut tries) = (usize::MAX, BLOCK_TRIES);
-        // Single exchanges are finite but may be many; this bound is far above anything seen.
+        // Single exchanges end but may be many; this bound is far above any observed count.
         let limit = 100 + 20 * size;
         for iteration in 1..=limit {
             rows.clear();
@@ -182,7 +182,7 @@ impl<T: Real> ActiveSet<T> {
             }
             let (given, solved, size) = ((offset, &shift[..], form), (&rows[..], &solution[..]), size.max(1));
             match symmetry {
-                // Rows lie side by side.
+                // Rows are contiguous in memory.
                 Symmetry::Symmetric => {
                     let column = |j| (extents.of(j).start, problem.row(j)[extents.of(j)].iter());
                     judge(problem, column, given, solved, y, own);
@@ -192,8 +192,8 @@ impl<T: Real> ActiveSet<T> {
                     judge(problem, column, given, solved, y, own);
                 }
             }
-            // On dependent rows the equations of the active rows may contradict each other: one that is left open lets
-            // go, one that is left violated waits for the others.
+            // Equations of dependent active rows may contradict each other: an active row left with a positive gap is
+            // dropped, a violated one stays.
             let exceeds = |i: usize, miss: T| exceeds_rounding(problem, own, i, miss);
             let open = |i: usize| singular && exceeds(i, y[i]);
             let violates = |i: usize| match problem.sets[i] {
@@ -207,7 +207,7 @@ impl<T: Real> ActiveSet<T> {
             violating.extend((0..size).filter(|&i| violates(i)));
             let (count, last) = (violating.len(), violating.last().copied().unwrap_or(0));
             if count == 0 {
-                // What multipliers make of y as they grow beyond all bounds is no rounding.
+                // A y that grows with unbounded multipliers is no rounding.
                 let held = |i: usize| match (problem.sets[i], active[i]) {
                     _ if active[i] && singular && exceeds(i, y[i].abs()) => false,
                     (AdmissibleSet::Free, _) => acceptance.bears(i, y[i].abs()),
@@ -224,7 +224,7 @@ impl<T: Real> ActiveSet<T> {
                         *lambda = T::zero();
                     }
                 }
-                // What is dropped is rounding in each row, but together?
+                // The dropped multipliers are rounding in each row, but perhaps not together.
                 if dropped && !proximal && !acceptance.accepts(multipliers) {
                     return Ok(Exchanges::Stuck(iteration));
                 }
@@ -257,14 +257,14 @@ impl<T: Real> ActiveSet<T> {
     ) -> Result<(), ContactFailure<T>> {
         let size = problem.size();
         let largest = (0..size).fold(T::zero(), |m, i| m.max(problem.delassus(i, i)));
-        // Small enough to converge in a few steps, large enough for a well-posed factorization.
+        // Small enough to converge in a few steps, large enough for a stable factorization.
         let share = T::epsilon().sqrt();
         self.shift.clear();
         self.shift.extend(
             (0..size)
                 .map(|i| share * if problem.delassus(i, i) > T::zero() { problem.delassus(i, i) } else { largest }),
         );
-        // From zero the first step is, but for D, the solution of least norm.
+        // From zero, the first step gives the least-norm solution up to D.
         self.center.clear();
         self.center.resize(size, T::zero());
         let mut before = T::infinity();
@@ -279,7 +279,7 @@ impl<T: Real> ActiveSet<T> {
                 return Ok(());
             }
             let (row, residual) = problem.residual(multipliers);
-            // What the multipliers gain no longer lowers the residual: it is rounding, or there is no solution.
+            // The residual no longer falls: it is rounding, or there is no solution.
             if step >= 3 && residual > T::of(0.5) * before {
                 if acceptance.accepts(multipliers) {
                     return Ok(());
@@ -298,12 +298,11 @@ impl<T: Real> ActiveSet<T> {
         Err(ContactFailure::NotConverged { iterations: *iterations, row, residual })
     }
 
-    /// What proximal steps could not solve: exactly by pivoting, or else as the steps left it, if no row misses more
-    /// than counts.
+    /// Solves a problem on which proximal steps failed: exactly by pivoting, or with the result of the steps if the
+    /// residual of every row is negligible.
     ///
-    /// Two nodes that face each other, each of them on the facets of the other, have rows that differ by the angle
-    /// between these facets, be it 1e-8, and gaps that differ by as much: no force that either could bear closes both
-    /// exactly.
+    /// If two nodes face each other and each lies on the facets of the other, their rows differ by the angle between
+    /// these facets, even if only 1e-8, and their gaps differ as much: no bearable force closes both exactly.
     fn settle(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -318,7 +317,7 @@ impl<T: Real> ActiveSet<T> {
         {
             return Ok(iterations);
         }
-        // (Of a contradiction the proximal steps know the least violation.)
+        // For a contradiction the proximal steps have found the least violation.
         multipliers.copy_from_slice(&self.center);
         match failure {
             ContactFailure::Contradictory { .. } if acceptance.is_negligible(multipliers) => Ok(iterations),
@@ -328,7 +327,7 @@ impl<T: Real> ActiveSet<T> {
 }
 
 impl<T: Real> ContactSolver<T> for ActiveSet<T> {
-    /// All of them.
+    /// All sets are supported.
     fn admits(&self, _set: AdmissibleSet) -> bool {
         true
     }

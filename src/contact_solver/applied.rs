@@ -1,16 +1,16 @@
-//! Contact problems whose W is known by its products alone: where the factor of a body changes with every iteration, a
-//! response for each of hundreds of rows would cost more than the factorization.
+//! Contact problems with a matrix-free W: if the factor of a body changes with every iteration, computing the
+//! response to each of hundreds of rows would cost more than the factorization.
 
 use super::{AdmissibleSet, ContactFailure};
 use crate::dense::dot;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Writes W x to its second argument, for x in its first.
+/// Writes W x to its second argument, with x its first.
 pub(crate) type Product<'a, T> = &'a mut dyn FnMut(&[T], &mut [T]);
 
-/// The problem of a [`ContactProblem`](super::ContactProblem) whose W is applied, not stored. All blocks have one row,
-/// and W is symmetric.
+/// A [`ContactProblem`](super::ContactProblem) whose W is applied, not stored. All blocks have one row, and W is
+/// symmetric.
 pub struct AppliedProblem<'a, T> {
     pub(crate) product: Product<'a, T>,
     pub(crate) scale: &'a [T],
@@ -26,7 +26,8 @@ impl<T: Real> std::fmt::Debug for AppliedProblem<'_, T> {
 }
 
 impl<'a, T: Real> AppliedProblem<'a, T> {
-    /// From what writes W x to its second argument, the size of the diagonal of W (positive), and the data of the rows.
+    /// From a function that writes W x to its second argument, the magnitude of the diagonal of W (positive), and the
+    /// data of the rows.
     ///
     /// ```
     /// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, AppliedProblem, ContactSolver};
@@ -44,7 +45,7 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Incompatible`] for sets of several rows.
+    /// [`Error::Dimension`] if the lengths disagree, [`Error::Incompatible`] for sets of several rows.
     pub fn new(
         product: &'a mut dyn FnMut(&[T], &mut [T]),
         scale: &'a [T],
@@ -74,45 +75,46 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
         self.offset.len()
     }
 
-    /// q: y at λ = 0, one a row.
+    /// q: y at λ = 0, one per row.
     pub fn offset(&self) -> &[T] {
         self.offset
     }
 
-    /// The set of each block, a row each.
+    /// The set of each block, one per row.
     pub fn sets(&self) -> &[AdmissibleSet] {
         self.sets
     }
 
-    /// For each row the size of y that is rounding.
+    /// The rounding of y in each row.
     pub fn tolerance(&self) -> &[T] {
         self.tolerance
     }
 
-    /// The size of the diagonal of W, positive, at most the diagonal itself where dofs of a row do not couple.
+    /// Magnitude of the diagonal of W: positive, and at most the diagonal itself if the dofs of a row are not
+    /// coupled.
     pub fn scale(&self) -> &[T] {
         self.scale
     }
 
-    /// `y = W x`, both with one entry a row: about a solve with the effective matrix.
+    /// `y = W x`, both with one entry per row; costs about one solve with the effective matrix.
     pub fn apply(&mut self, x: &[T], y: &mut [T]) {
         (self.product)(x, y);
     }
 }
 
-/// Exchanges of rows granted.
+/// Limit of row exchanges.
 const EXCHANGES: usize = 40;
 
-/// Exchanges granted without progress.
+/// Exchanges allowed without progress.
 const TRIES: usize = 4;
 
-/// Products granted to the equations of one active set.
+/// Products allowed for the equations of one active set.
 const PRODUCTS: usize = 200;
 
-/// Times that the equations are solved again for what rounding has left.
+/// Restarts of the equation solver to reduce rounding errors.
 const REFINEMENTS: usize = 3;
 
-/// How well equations are met, the best first.
+/// How well equations are met; the best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Met {
     /// To the rounding of their own terms.
@@ -122,7 +124,7 @@ enum Met {
     Not,
 }
 
-/// Memory of the primal–dual active set on products of W.
+/// Memory of the primal–dual active set with a matrix-free W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AppliedSet<T> {
     active: Vec<bool>,
@@ -135,7 +137,7 @@ pub(super) struct AppliedSet<T> {
 }
 
 impl<T: Real> AppliedSet<T> {
-    /// Solves from the guess in `multipliers`. An error means that the problem asks for a solver that sees W.
+    /// Solves from the guess in `multipliers`. An error means that the problem needs a solver with an assembled W.
     pub(super) fn solve(
         &mut self,
         problem: &mut AppliedProblem<'_, T>,
@@ -150,7 +152,7 @@ impl<T: Real> AppliedSet<T> {
         let guess = multipliers.iter().zip(problem.sets);
         self.active.clear();
         self.active.extend(guess.map(|(&lambda, &set)| set == AdmissibleSet::Free || lambda > T::zero()));
-        // (The scale of a guess must not outlive its cause.)
+        // The magnitude of an old guess must not persist.
         multipliers.fill(T::zero());
         let (mut fewest, mut tries) = (usize::MAX, TRIES);
         for exchange in 1..=EXCHANGES {
@@ -187,8 +189,8 @@ impl<T: Real> AppliedSet<T> {
         Err(ContactFailure::NotConverged { iterations: EXCHANGES, row: 0, residual: T::nan() })
     }
 
-    /// Solves the equations of the active rows by conjugate gradients, from the multipliers there are, and leaves y and
-    /// what of it is noise. Says whether every equation is met to that.
+    /// Solves the equations of the active rows by conjugate gradients, starting from the present multipliers, and
+    /// leaves y and its noise. Returns whether every equation is met within that noise.
     fn solve_active(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &mut [T]) -> bool {
         for (lambda, &active) in multipliers.iter_mut().zip(&self.active) {
             if !active {
@@ -206,7 +208,8 @@ impl<T: Real> AppliedSet<T> {
         self.observe(problem, multipliers) != Met::Not
     }
 
-    /// y, the rounding of its terms, and the noise below which it counts as zero; how well equations are met.
+    /// Evaluates y, the rounding of its terms, and the noise below which it counts as zero; returns how well the
+    /// equations are met.
     fn observe(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &[T]) -> Met {
         let Self { active, y, noise, rounding, direction, product, .. } = self;
         problem.apply(multipliers, y);
@@ -218,10 +221,10 @@ impl<T: Real> AppliedSet<T> {
         let share = T::of(1e-12).max(T::of(8.0) * T::epsilon()) * largest;
         let mut met = Met::Exactly;
         for (i, y) in y.iter_mut().enumerate() {
-            // Entries of W may cancel in the sum of sizes: no less than the row's own.
+            // Entries of W may cancel in the product with magnitudes: the row's own terms are a lower bound.
             let terms = product[i].abs().max(y.abs()).max(problem.scale[i] * multipliers[i].abs());
             *y += problem.offset[i];
-            // (Where iterations end must not depend on tolerances, which know where rows were read.)
+            // Convergence must not depend on tolerances, because these depend on where the rows were evaluated.
             rounding[i] = T::of(32.0) * T::epsilon() * (problem.offset[i].abs() + terms);
             noise[i] = problem.tolerance[i] + rounding[i] + share;
             let row = match y.abs() {
@@ -236,7 +239,7 @@ impl<T: Real> AppliedSet<T> {
         met
     }
 
-    /// Conjugate gradients on the active rows, scaled by the diagonal, from y of the multipliers.
+    /// Conjugate gradients on the active rows, scaled by the diagonal, starting from the y of the multipliers.
     fn iterate(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &mut [T]) -> bool {
         let Self { active, y, residual, direction, product, rounding, .. } = self;
         for ((r, &y), &active) in residual.iter_mut().zip(y.iter()).zip(active.iter()) {
@@ -244,7 +247,7 @@ impl<T: Real> AppliedSet<T> {
         }
         direction.fill(T::zero());
         let weighted = |x: &[T], scale: &[T]| x.iter().zip(scale).map(|(&x, &s)| x * x / s).sum::<T>();
-        // Each equation within a fraction of its own rounding.
+        // Goal: each equation within a fraction of its own rounding.
         let goal = weighted(rounding, problem.scale) * T::of(1e-2) / T::of(residual.len() as f64);
         let mut before = T::zero();
         for step in 0..PRODUCTS {
@@ -271,7 +274,7 @@ impl<T: Real> AppliedSet<T> {
                 }
             }
         }
-        // Rounding may have stopped it: what is left is looked at once more.
+        // Rounding may have stalled the iteration; the caller evaluates the residual again.
         true
     }
 }

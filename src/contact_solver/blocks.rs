@@ -1,4 +1,4 @@
-//! Problems with cones, block by block: when they count as solved, sweeps until they are, and why they are not.
+//! Problems with cones, block by block: acceptance, sweeps, and failures.
 
 use super::acceptance::nothing;
 use super::sweeps::{self, Sweeps};
@@ -6,19 +6,19 @@ use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::real::Real;
 use std::ops::Range;
 
-/// When a problem with cones counts as solved: every block misses its conditions by no more than rounding, or than a
-/// share of the largest |q|.
+/// Acceptance rule of a problem with cones: every block misses its conditions at most by rounding, or by a share of
+/// the largest |q|.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockAcceptance<T> {
     accepted: T,
-    /// What may be rounding at most, whatever the multipliers are: a small share of many times the largest |q|. (Where
-    /// there is no solution they grow beyond all bounds, and their rounding with them.)
+    /// Upper bound of rounding, for any multipliers: a small share of a multiple of the largest |q|. Without a
+    /// solution the multipliers grow without bound, and their rounding with them.
     largest: T,
 }
 
 impl<T: Real> BlockAcceptance<T> {
-    /// Begins at zero: where there are several solutions the guess must not choose. Refuses what no iteration could
-    /// mend, as that of the other sets does. (That W is finite shows in the result.)
+    /// Starts at zero: if there are several solutions the guess must not select one. Rejects the same defects as the
+    /// rule for the other sets. A non-finite W is detected from the result.
     pub(super) fn begin(
         problem: &ContactProblem<'_, T>,
         tolerance: T,
@@ -38,9 +38,9 @@ impl<T: Real> BlockAcceptance<T> {
         Ok(acceptance)
     }
 
-    /// The rule for a problem, whose rest is known to be sound.
+    /// The rule for a problem that is already checked.
     pub(super) fn of(problem: &ContactProblem<'_, T>, tolerance: T) -> Self {
-        /// What in single precision, of which little would be left, may be rounding at most.
+        /// Bound of the share in single precision, where ε^0.4 is too large.
         const SHARE: f64 = 3e-3;
         let scale = T::largest(problem.offset);
         let accepted = (tolerance * scale).max(nothing());
@@ -52,9 +52,9 @@ impl<T: Real> BlockAcceptance<T> {
     pub(super) fn accepts(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
         problem.blocks().all(|(rows, set)| {
             let misses = problem.block_misses(rows.clone(), set, multipliers);
-            // NaN fails both.
+            // NaN fails both comparisons.
             misses.iter().all(|&miss| miss <= self.accepted) || {
-                // (Slips may be known much less than gaps, and that nothing pulls is a matter of the gap.)
+                // Slips may be known less accurately than gaps; whether a contact pulls depends on the gap only.
                 let known = |row: usize| problem.rounding(row, multipliers).min(problem.tolerance[row] + self.largest);
                 let first = known(rows.start);
                 let bounds = [first, rows.skip(1).map(known).fold(first, T::max)];
@@ -63,7 +63,7 @@ impl<T: Real> BlockAcceptance<T> {
         })
     }
 
-    /// Whether multipliers that are all zero solve the problem: y is q then.
+    /// Whether all multipliers are zero and solve the problem, so that y = q.
     fn accepts_idle(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
         multipliers.iter().all(|&multiplier| multiplier == T::zero())
             && problem.blocks().all(|(rows, set)| {
@@ -71,15 +71,15 @@ impl<T: Real> BlockAcceptance<T> {
                 for (compliance, row) in compliance.iter_mut().zip(rows.clone()) {
                     *compliance = problem.delassus(row, row);
                 }
-                // (Without a normal force nothing is asked of the tangential rows, whose rounding may be much larger.)
+                // Without a normal force the tangential rows have no condition; their rounding may be much larger.
                 let noise = problem.rounding_idle(rows.start);
                 let (q, none) = (&problem.offset[rows.clone()], &multipliers[rows.clone()]);
                 set.residual(q, none, &compliance[..rows.len()]) <= self.accepted.max(T::of(2.0) * noise)
             })
     }
 
-    /// Sweeps until the problem is solved, or so many; says whether it is, and counts them. An `impatient` one ends too
-    /// where sweeps hardly change less than those before.
+    /// Sweeps until the problem is solved, at most `sweeps` times; returns whether it is solved and counts the
+    /// sweeps. If `impatient`, it also stops once the change per sweep hardly decreases.
     pub(super) fn sweep(
         &self,
         problem: &ContactProblem<'_, T>,
@@ -88,12 +88,13 @@ impl<T: Real> BlockAcceptance<T> {
         impatient: bool,
         (spent, multipliers): (&mut usize, &mut [T]),
     ) -> bool {
-        /// Sweeps after which the change has to be half of what it was; else it may be all rounding already.
+        /// Interval of sweeps in which the change must halve; otherwise it may be rounding already.
         const LOOK: usize = 8;
-        /// Growth of the change at which sweeps diverge, as they may where W is not symmetric: what they have made is
-        /// then nothing to go on from.
+        /// Growth of the change that counts as divergence, possible for an unsymmetric W; the multipliers are then
+        /// discarded.
         const DIVERGES: f64 = 1e3;
-        // Where no force is needed but for rounding there is none: one that rounding asks for would choose a friction.
+        // If zero forces solve the problem within rounding, they are kept: a force due to rounding would select a
+        // friction.
         if self.accepts_idle(problem, multipliers) {
             return true;
         }
@@ -114,14 +115,14 @@ impl<T: Real> BlockAcceptance<T> {
             }
             let ends = diverges || stalls && impatient || left == 0;
             if (ends || stalls || converges) && memory.is_mistaken(problem) {
-                // All of it was wrong.
+                // Start again: all sweeps used a wrong W.
                 multipliers.fill(T::zero());
                 memory.begin(problem, multipliers);
                 (before, least, left) = (T::infinity(), T::infinity(), sweeps);
                 continue;
             }
             if converges {
-                // It is not accepted: rounding of W across its diagonal.
+                // The residual is too large although sweeps converged: W is asymmetric by rounding.
                 memory.read_all();
             }
             if diverges {
@@ -138,7 +139,7 @@ impl<T: Real> BlockAcceptance<T> {
     }
 }
 
-/// The failure that names the worst block.
+/// The failure with the worst block.
 pub(super) fn failure<T: Real>(
     problem: &ContactProblem<'_, T>,
     iterations: usize,
@@ -154,8 +155,8 @@ pub(super) fn failure<T: Real>(
     ContactFailure::NotConverged { iterations, row, residual }
 }
 
-/// A contact that has no solution, whatever the others do: these move neither its gap nor its slip. (Of one that they
-/// move nothing is proven: they may push it open.)
+/// A contact without solution that no other contact affects, neither its gap nor its slip. A contact affected by
+/// others is not proven to jam: they may push it open.
 fn jammed<T: Real>(problem: &ContactProblem<'_, T>) -> Option<ContactFailure<T>> {
     let failure = |(rows, set): (Range<usize>, AdmissibleSet)| {
         let (row, friction) = (rows.start, set.friction()?);

@@ -1,9 +1,8 @@
-//! One contact with friction, alone: the multipliers of a block of a normal row and one or two tangential ones,
-//! exactly.
+//! Exact solution of one contact with friction: a block of a normal row and one or two tangential rows.
 
 use crate::real::Real;
 
-/// A block W r + b of a contact, with the friction coefficient of its cone; two rows are three whose last is nothing.
+/// A block W r + b of a contact, with its friction coefficient; blocks of two rows are padded to three.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone<T> {
     /// W of the block, row by row: the normal row first.
@@ -13,24 +12,24 @@ pub(super) struct Cone<T> {
     pub(super) friction: T,
     /// 1 or 2.
     pub(super) tangents: usize,
-    /// Whether the gap is zero whatever p is; there is friction only where p is positive.
+    /// Whether y_n = 0 for any p; friction then acts only if p is positive.
     pub(super) is_bilateral: bool,
-    /// What of the tangential offset is rounding.
+    /// Rounding of the tangential offset.
     pub(super) noise: T,
-    /// The friction there is: where it slides on, the solution is near.
+    /// The present friction; if the contact keeps sliding, the solution is near.
     pub(super) guess: [T; 2],
 }
 
-/// The most steps of the search for the direction of slip, which takes three or four.
+/// Limit of steps of the search for the slip direction, which takes three or four.
 const STEPS: usize = 200;
 
 impl<T: Real> Cone<T> {
     /// The multipliers (p, f) with 0 ≤ y_n ⊥ p ≥ 0, |f| ≤ μ p, and y_t = −γ f with γ ≥ 0 where |f| = μ p.
     ///
-    /// A block that is open without forces stays open, though for a large μ it might stick as well. Else it sticks if
-    /// the multipliers that hold it are in the cone. If not, it slides: with the normal multiplier eliminated,
-    /// y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ, so that there
-    /// is a γ at which it vanishes.
+    /// A block that is open without forces stays open, though with a large μ it might stick as well. Otherwise it
+    /// sticks if the multipliers that hold it are in the cone. Otherwise it slides: with the normal multiplier
+    /// eliminated, y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ,
+    /// so it has a root.
     pub(super) fn solve(&self) -> [T; 3] {
         let Self { delassus: w, offset: b, friction, tangents, is_bilateral, noise, guess } = *self;
         let none = [T::zero(); 3];
@@ -59,7 +58,7 @@ impl<T: Real> Cone<T> {
             let change = |f: [T; 2]| -(w[0][1] * f[0] + w[0][2] * f[1]) / w[0][0];
             slip_direction(schur, c, guess, [&|f| friction * normal(f), &|f| friction * change(f)])
         };
-        // In this direction the block is on the rim of its cone, and its gap is zero, to rounding.
+        // In this direction the block is on the boundary of its cone, and its gap is zero, to rounding.
         let along = w[0][1] * direction[0] + w[0][2] * direction[1];
         let p = -b[0] / (w[0][0] + friction * along);
         [p, friction * p * direction[0], friction * p * direction[1]]
@@ -72,20 +71,19 @@ impl<T: Real> Cone<T> {
         let s = |i: usize, j: usize| without(i, w[i][j], w[0][j]);
         let c = [without(1, b[1], b[0]), if tangents > 1 { without(2, b[2], b[0]) } else { T::zero() }];
         let schur = match tangents {
-            // (A second direction that nothing asks for, as compliant as the first.)
+            // The second direction is unloaded and as compliant as the first.
             1 => [[s(1, 1), T::zero()], [T::zero(), s(1, 1)]],
             _ => [[s(1, 1), s(1, 2)], [s(2, 1), s(2, 2)]],
         };
         (schur, c)
     }
 
-    /// Whether it is proven, but for rounding, that the block has no solution (Painlevé): none that sticks, and none
-    /// that slides.
+    /// Whether the block provably has no solution (Painlevé), up to rounding: neither sticking nor sliding.
     ///
-    /// If S is definite there is one. Else S = s e eᵀ, and c has a part k d, d ⊥ e a unit vector, that no friction
-    /// stops. Where it slides f(γ) = −k d/γ − c_e e/(s + γ), and |f| − μ p ≤ −A/γ + B/(s + γ) − C with
-    /// A = −k (1 − μ w·d/W_nn), B = |c_e| − μ (w·e) c_e/W_nn, C = −μ b_n/W_nn and w = W_nt. The largest value of this
-    /// over γ is −C if B ≤ A, or else (√B − √A)²/s − C.
+    /// If S is definite there is a solution. Otherwise S = s e eᵀ, and c has a part k d, with the unit vector d ⊥ e,
+    /// that no friction stops. For sliding f(γ) = −k d/γ − c_e e/(s + γ), and |f| − μ p ≤ −A/γ + B/(s + γ) − C with A
+    /// = −k (1 − μ w·d/W_nn), B = |c_e| − μ (w·e) c_e/W_nn, C = −μ b_n/W_nn and w = W_nt. The maximum of this bound
+    /// over γ is −C if B ≤ A, otherwise (√B − √A)²/s − C.
     pub(super) fn jams(&self) -> bool {
         let Self { delassus: w, offset: b, friction, noise, .. } = *self;
         if w[0][0] <= T::zero() || b[0] >= T::zero() {
@@ -114,14 +112,14 @@ impl<T: Real> Cone<T> {
     }
 }
 
-/// S f = −c, with the least f where S is singular; nothing if no f will do, but for rounding.
+/// Solves S f = −c, with the least f if S is singular; `None` if no f solves it within rounding.
 fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
     let tiny = T::of(64.0) * T::epsilon();
     let (trace, determinant) = (s[0][0] + s[1][1], s[0][0] * s[1][1] - s[0][1] * s[1][0]);
     if determinant > tiny * trace * trace {
         return Some(solve_two(s, T::zero(), c)).filter(|f| f.iter().all(|f| f.is_finite()));
     }
-    // S = trace e eᵀ, e along its larger column.
+    // S = trace e eᵀ, with e along the larger column.
     let column = if s[0][0] >= s[1][1] { [s[0][0], s[1][0]] } else { [s[0][1], s[1][1]] };
     let size = norm(column);
     let e = if size > T::zero() { column.map(|x| x / size) } else { column };
@@ -131,12 +129,12 @@ fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
     (across <= noise + tiny * norm(c)).then_some(held)
 }
 
-/// The direction of the friction of a block that slides in a plane: that of f(γ), −(S + γ)⁻¹ c, at the γ at which
-/// |f| = μ p. With |f| nearly proportional to 1/(S + γ) the quotient μ p/|f| is nearly linear in γ, so that Newton's
-/// method on it, begun anywhere, ends in a few steps; they are kept in the interval in which the solution is.
+/// The friction direction of a block sliding in a plane: the direction of f(γ) = −(S + γ)⁻¹ c at the γ with |f| = μ
+/// p. Since |f| is nearly proportional to 1/(S + γ), the quotient μ p/|f| is nearly linear in γ, and Newton's method
+/// on it takes a few steps from any start; the steps are kept in the interval that contains the solution.
 ///
-/// μ p is given as a function of f, and how it changes with f. (As a difference that would be lost in the rounding of
-/// μ p(0) where W is large in the units of the run.)
+/// μ p and its derivative are given as functions of f. A finite difference would be lost in the rounding of μ p(0) if
+/// W is large in the units of the run.
 fn slip_direction<T: Real>(
     schur: [[T; 2]; 2],
     c: [T; 2],
@@ -145,12 +143,12 @@ fn slip_direction<T: Real>(
 ) -> [T; 2] {
     let (two, size) = (T::of(2.0), (schur[0][0] + schur[1][1]).abs());
     if size == T::zero() {
-        // Nothing that the friction does changes the slip (that of dofs without mass does not): it is against it.
+        // Friction does not change the slip, as for dofs without mass; it is opposed to the slip.
         let length = norm(c);
         return c.map(|c| -c / length);
     }
     let (mut low, mut high) = (T::zero(), T::infinity());
-    // The slip S g + c of the guess g is −γ g for the solution.
+    // For the solution g, the slip S g + c equals −γ g; applied to the guess this estimates γ.
     let length = norm(guess);
     let guess = guess.map(|f| f / length);
     let along = |k: usize| guess[k] * (schur[k][0] * guess[0] + schur[k][1] * guess[1] + c[k] / length);
@@ -159,19 +157,18 @@ fn slip_direction<T: Real>(
     let mut f = solve_two(schur, gamma, c);
     for _ in 0..STEPS {
         let (length, radius) = (norm(f), bound(f));
-        // (Where S is singular f(0) is no number, or without bound.)
+        // If S is singular, f(0) is NaN or unbounded.
         if length < radius {
             high = gamma;
         } else {
             low = gamma;
         }
-        // d f/d γ = −(S + γ)⁻¹ f. (As shares of |f|: where S is nearly singular |f|² may be beyond the numbers of
-        // `f32`.)
+        // d f/d γ = −(S + γ)⁻¹ f, computed relative to |f|: for a nearly singular S, |f|² may overflow in `f32`.
         let (share, unit) = (radius / length, f.map(|f| f / length));
         let slope = solve_two(schur, gamma, unit);
         let step = (T::one() - share) / (change(slope) - share * (unit[0] * slope[0] + unit[1] * slope[1]));
         let next = gamma + step;
-        // (NaN is in no interval.)
+        // NaN fails the interval test.
         let next = if next >= low && next <= high && next.is_finite() {
             next
         } else if high.is_finite() {
@@ -193,7 +190,7 @@ fn slip_direction<T: Real>(
     }
 }
 
-/// The length of a vector, whatever its unit. (The `hypot` of a library takes longer than the rest of a block.)
+/// The length of a vector in any unit. The library's `hypot` takes longer than the rest of a block.
 pub(super) fn norm<T: Real>([x, y]: [T; 2]) -> T {
     let (x, y) = (x.abs(), y.abs());
     let (most, least) = if x > y { (x, y) } else { (y, x) };
@@ -223,7 +220,7 @@ mod tests {
                 assert!((norm([x * unit, y * unit]) - length * unit).abs() <= 1e-15 * length * unit, "{x} {y} {unit}");
             }
         }
-        // The square of neither their quotient nor of them is a number.
+        // The squares of these numbers and of their quotient overflow or underflow.
         for (large, small) in [(1e200_f64, 1e-200), (-1e300, 1e-5)] {
             assert!([norm([large, small]), norm([small, large])].iter().all(|x| (x / large.abs() - 1.0).abs() < 1e-15));
         }

@@ -1,4 +1,4 @@
-//! Contact problems with friction by a semismooth Newton method: open, stick and slip as states of the blocks.
+//! Contact problems with friction by a semismooth Newton method on the block states open, stick and slip.
 
 use super::blocks::{BlockAcceptance, failure};
 use super::sweeps::Sweeps;
@@ -6,14 +6,14 @@ use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
-/// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), begun from sweeps over
-/// the blocks, and from more of them where it does not end. On redundant rows neither may end: then the problem is
-/// solved by proximal steps, each of which has a positive definite W.
+/// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), started from sweeps
+/// over the blocks, and restarted from more sweeps if it does not end. On redundant rows neither may end; the problem
+/// is then solved by proximal steps, each with a positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
     sweeps: Sweeps<T>,
     factor: DenseCholesky<T>,
-    /// What each block is, and the rows of those that are not open.
+    /// The state of each block, and the rows of blocks that are not open.
     statuses: Vec<Status<T>>,
     rows: Vec<usize>,
     matrix: Vec<T>,
@@ -27,28 +27,28 @@ pub(super) struct ConeNewton<T> {
     center: Vec<T>,
 }
 
-/// Sweeps before Newton's method: at first, and each time that it has not ended.
+/// Sweeps before Newton's method: before the first attempt, and before each later one.
 const FIRST_SWEEPS: usize = 3;
 const MORE_SWEEPS: usize = 50;
 
-/// Newton iterations before more sweeps, and how often both are tried.
+/// Newton iterations per attempt, and number of attempts.
 const ITERATIONS: usize = 20;
 const ROUNDS: usize = 4;
 
-/// Proximal steps: the share of the diagonal that is added to W at first, by how much it shrinks, and the least. (What
-/// distinguishes nearly redundant rows is found only with a share below its own part of the diagonal.)
+/// Proximal steps: the initial share of the diagonal added to W, its shrink factor, and its minimum. Nearly redundant
+/// rows are resolved only with a share below their difference relative to the diagonal.
 const PROXIMAL_STEPS: usize = 300;
 const FIRST_SHARE: f64 = 1.0;
 const SHRINK: f64 = 0.3;
 const LEAST_SHARE: f64 = 1e-13;
 
-/// Sweeps that go on alone in the end.
+/// Final sweeps without Newton's method.
 const LAST_SWEEPS: usize = 20_000;
 
-/// Iterations in which what is pulled by rounding is open.
+/// Iterations in which blocks that pull by rounding are open.
 const LETS_GO: usize = 3;
 
-/// What becomes in an iteration of a block that is pulled, and may not be.
+/// Treatment of a unilateral block that pulls in an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Pulled {
     /// Its conditions decide.
@@ -57,15 +57,15 @@ enum Pulled {
     LetsGo,
 }
 
-/// What a block is in an iteration.
+/// State of a block in an iteration.
 #[derive(Clone, Copy, Debug)]
 enum Status<T> {
     /// λ = 0.
     Open,
     /// y = 0.
     Held,
-    /// Slides: the friction is μ p times this direction. With κ, the share of the disc's radius in the length of the
-    /// point whose nearest one is sought, and the larger compliance of the tangential rows.
+    /// Slides: the friction is μ p times `direction`. `share` is κ, the radius of the disc divided by the length of
+    /// the point projected onto it; `compliance` is the larger diagonal entry of the tangential rows.
     Slides { direction: [T; 2], share: T, compliance: T },
 }
 
@@ -82,14 +82,14 @@ impl<T: Real> ConeNewton<T> {
         self.sweeps.reset();
         let mut spent = 0;
         for round in 0..ROUNDS {
-            // A sweep costs about as much as the share 3/n of an iteration: at first as many as half of one, while they
-            // converge.
+            // A sweep costs about 3/n of an iteration: first up to half an iteration's worth of sweeps, as long as
+            // they converge.
             let sweeps = if round == 0 { FIRST_SWEEPS.max(problem.size() / 6) } else { MORE_SWEEPS };
             if acceptance.sweep(problem, (&mut self.sweeps, T::one()), sweeps, true, (&mut spent, multipliers)) {
                 return Ok(spent);
             }
             if round == 0 {
-                // (What sweeps have solved is finite.)
+                // A problem solved by sweeps is finite.
                 problem.check_finite(false)?;
             }
             if self.newton(problem, &acceptance, &mut spent, multipliers) {
@@ -104,7 +104,7 @@ impl<T: Real> ConeNewton<T> {
         Err(failure(problem, spent, multipliers))
     }
 
-    /// Memory for so many rows, if there have never been as many.
+    /// Grows the memory to at least this many rows.
     fn make_room(&mut self, size: usize) {
         let Self { factor, statuses, rows, matrix, right, y, tried, found, .. } = self;
         if matrix.capacity() < size * size {
@@ -118,8 +118,8 @@ impl<T: Real> ConeNewton<T> {
         }
     }
 
-    /// Newton iterations; says whether they have ended, and nothing pulls. If not, the multipliers are left as they
-    /// were.
+    /// Newton iterations; returns whether they have converged without pulling contacts. If not, the multipliers are
+    /// unchanged.
     fn newton(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -152,9 +152,9 @@ impl<T: Real> ConeNewton<T> {
         solved
     }
 
-    /// What is held without a force may be pulled by rounding: it is open then, if that does as well. All that are
-    /// pulled, with the others as they are, or with these solved for once more; or else those of them for which it
-    /// does.
+    /// A closed contact without force may pull by rounding: it is opened if the result is still accepted. First all
+    /// such contacts are opened with the others unchanged, then with the others solved again; otherwise one by one,
+    /// as far as the result is accepted.
     fn let_go(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -199,7 +199,7 @@ impl<T: Real> ConeNewton<T> {
         }
     }
 
-    /// Proximal steps: λ' solves the problem with W + D and q − D λ, D a share of the diagonal of W that shrinks.
+    /// Proximal steps: λ' solves the problem with W + D and q − D λ, with D a shrinking share of the diagonal of W.
     fn proximal(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -219,7 +219,7 @@ impl<T: Real> ConeNewton<T> {
             offset.clear();
             offset.extend_from_slice(problem.offset);
             for (rows, _) in problem.blocks() {
-                // (One number a block: tangential directions stay equal.)
+                // One value per block, so that tangential directions stay equivalent.
                 let own = rows.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
                 for row in rows {
                     shifted[row * size + row] += share * own;
@@ -235,7 +235,7 @@ impl<T: Real> ConeNewton<T> {
             if solved {
                 break;
             }
-            // A step that cannot be solved is too bold.
+            // A step that cannot be solved was too large.
             share = match ended {
                 true => (share * T::of(SHRINK)).max(T::of(LEAST_SHARE)),
                 false => share / T::of(SHRINK * SHRINK),
@@ -245,7 +245,7 @@ impl<T: Real> ConeNewton<T> {
         solved
     }
 
-    /// One iteration; says whether its equations could be solved.
+    /// One iteration; returns whether its equations were solvable.
     fn iterate(&mut self, problem: &ContactProblem<'_, T>, pulled: Pulled, multipliers: &mut [T]) -> bool {
         let Self { factor, statuses, rows, matrix, right, y, .. } = self;
         y.clear();
@@ -270,14 +270,15 @@ impl<T: Real> ConeNewton<T> {
                 continue;
             }
             let first = block.start;
-            // The normal row, or the only one: y = 0.
+            // The normal row, or the only row: y = 0.
             matrix.extend(rows.iter().map(|&j| problem.delassus(first, j)));
             right.push(-problem.offset[first]);
             for (k, row) in block.clone().enumerate().skip(1) {
                 match status {
                     Status::Slides { direction, share, compliance } => {
                         let friction = T::of(set.friction().unwrap_or(0.0));
-                        // W_t f − μ W_t p n − κ (1 − n nᵀ) (W_t f − y_t) = 0, κ and n as they are, and κ |…| = μ W_t p.
+                        // W_t f − μ W_t p n − κ (1 − n nᵀ) (W_t f − y_t) = 0, with κ and n fixed, and κ |…| = μ W_t
+                        // p.
                         let across = |i: usize| {
                             let own = if i == k { T::one() } else { T::zero() };
                             share * (own - direction[k - 1] * direction[i - 1])
@@ -319,12 +320,12 @@ impl<T: Real> ConeNewton<T> {
     }
 }
 
-/// Whether the force of a block that only presses pulls.
+/// Whether a unilateral block has a pulling force.
 fn is_pulled<T: Real>(first: usize, set: AdmissibleSet, multipliers: &[T]) -> bool {
     !set.is_bilateral() && multipliers[first] < T::zero()
 }
 
-/// Whether a contact pulls by more than the rounding of the largest multiplier, rows measured by √W_ii.
+/// Whether a contact pulls by more than the rounding of the largest multiplier, with rows scaled by √W_ii.
 fn pulls_beyond_rounding<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
     /// Roundings by which a contact may pull.
     const ROUNDINGS: f64 = 16.0;
@@ -334,7 +335,7 @@ fn pulls_beyond_rounding<T: Real>(problem: &ContactProblem<'_, T>, multipliers: 
     problem.blocks().any(|(rows, set)| !set.is_bilateral() && measured(rows.start) < least)
 }
 
-/// What the rows of a block are at these multipliers and y.
+/// The state of a block at these multipliers and y.
 fn status<T: Real>(
     problem: &ContactProblem<'_, T>,
     first: usize,
@@ -353,7 +354,7 @@ fn status<T: Real>(
     let tangents = first + 1..first + set.rows();
     let compliance = tangents.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
     if multipliers[first] <= T::zero() && set.is_bilateral() {
-        // Pulled: no friction.
+        // A pulling bilateral contact has no friction.
         return Status::Slides { direction: [T::zero(); 2], share: T::zero(), compliance };
     }
     let mut aim = [T::zero(); 2];

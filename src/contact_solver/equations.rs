@@ -1,5 +1,5 @@
-//! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or of many rows by iteration. What is computed from
-//! W serves again while W and the rows stay.
+//! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or for many rows by iteration. The factorization
+//! or preconditioner is reused while W and the rows stay the same.
 
 use super::extents::Extents;
 use super::many_rows::ManyRows;
@@ -7,13 +7,13 @@ use super::{ContactProblem, FORESEEN, MANY};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
-/// A factor of W on some rows, or what takes its place.
+/// A factor of W on some rows, or the iterative solver that replaces it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Equations<T> {
     factor: DenseCholesky<T>,
     many: ManyRows<T>,
     method: Method,
-    /// The version of W, and the rows, to which these belong; version 0 if to none.
+    /// The version of W, and the rows, of the stored factorization; version 0 if there is none.
     version: u64,
     rows: Vec<usize>,
 }
@@ -34,27 +34,27 @@ pub(super) enum Symmetry {
     General,
 }
 
-/// What became of the equations.
+/// Result of solving the equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Solved {
-    /// They have one solution.
+    /// The solution is unique.
     Once,
-    /// Rows depend on one another: of all solutions the one of least norm was taken.
+    /// The rows are dependent: the least-norm solution was taken.
     LeastNorm,
-    /// Rows depend on one another, and W is not symmetric: none was found.
+    /// The rows are dependent and W is not symmetric: no solution was computed.
     Not,
 }
 
 impl<T: Real> Equations<T> {
-    /// Memory for up to so many rows. Of many the factor is a last resort, and gets its memory when it is needed.
+    /// Memory for up to `rows` rows. For many rows the factor is a fallback and is allocated only when needed.
     pub(super) fn with_capacity(rows: usize) -> Self {
         let dense = if rows < MANY { rows } else { FORESEEN };
         let factor = DenseCholesky::with_capacity(dense);
         Self { factor, many: ManyRows::default(), method: Method::Factor, version: 0, rows: Vec::with_capacity(rows) }
     }
 
-    /// Solves for `x`, which holds −q on entry. With a `shift` of the diagonal W is positive definite, and what is
-    /// computed serves once. `Err(row)` names a row of the problem whose W is not finite, or not semidefinite.
+    /// Solves for `x`, which holds −q on entry. With a `shift` of the diagonal W is positive definite, and its
+    /// factorization is not reused. `Err(row)` gives a row of the problem whose W is not finite or not semidefinite.
     pub(super) fn solve(
         &mut self,
         (problem, extents): (&ContactProblem<'_, T>, &Extents),

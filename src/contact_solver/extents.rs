@@ -1,27 +1,27 @@
-//! Where the rows of W begin and end: of bodies side by side the contacts of one joint move those of the next joints
-//! only, and what is zero beyond need not be read again and again.
+//! The nonzero range of each row of W. In a row of bodies, the contacts of one joint move only those of the next
+//! joints, so the zeros beyond need not be read.
 
 use super::ContactProblem;
 use crate::real::Real;
 use std::ops::Range;
 
-/// From the first entry of each row of W that is not zero to the last one.
+/// The range from the first to the last nonzero entry of each row of W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Extents {
     ranges: Vec<(usize, usize)>,
 }
 
-/// Rows begin and end at multiples of this: so many partial sums has a [`dot`](crate::dense::dot), which are then the
-/// same, to the bit, as those of a whole row.
+/// Ranges begin and end at multiples of this number, the number of partial sums of a [`dot`](crate::dense::dot), so
+/// that products are bitwise equal to those over whole rows.
 const LANES: usize = 4;
 
 impl Extents {
-    /// Memory for so many rows.
+    /// Memory for this many rows.
     pub(super) fn with_capacity(rows: usize) -> Self {
         Self { ranges: Vec::with_capacity(rows) }
     }
 
-    /// Looks at all rows. (What is not a number is not zero.)
+    /// Finds the ranges of all rows. NaN counts as nonzero.
     pub(super) fn find<T: Real>(&mut self, problem: &ContactProblem<'_, T>) {
         self.ranges.clear();
         self.ranges.extend((0..problem.size()).map(|i| {
@@ -33,7 +33,7 @@ impl Extents {
         }));
     }
 
-    /// Where row i is not zero; its diagonal is always within.
+    /// The nonzero range of row i; it always includes the diagonal.
     pub(super) fn of(&self, i: usize) -> Range<usize> {
         let (begin, end) = self.ranges[i];
         begin..end

@@ -7,36 +7,35 @@ use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Projected Gauss–Seidel, with over-relaxation if wanted: each row in turn closes its own gap, as far as its
-/// multiplier may.
+/// Projected Gauss–Seidel with optional over-relaxation: each row in turn closes its own gap within the bounds of its
+/// multiplier.
 ///
 /// ```text
 /// λ_i ← max(0, λ_i − ω y_i / W_ii)      free rows: without max
 /// ```
 ///
 /// C. W. Cryer, The solution of a quadratic programming problem using systematic overrelaxation (SIAM J. Control 9,
-/// 1971). It needs no memory (with friction two numbers a row), and O(n²) operations a sweep. It converges for every
-/// positive semi-definite W if the problem has a solution and 0 < ω < 2 (Luo and Tseng, SIAM J. Control Optim. 29,
-/// 1991, and J. Optim. Theory Appl. 72, 1992), hence with redundant rows too. y is then unique, the multipliers are
-/// not: it finds those that its sweeps reach, which depend on the guess and on the order of the rows.
+/// 1971). It needs no memory (with friction two numbers per row) and O(n²) operations per sweep. It converges for
+/// every positive semi-definite W, so also with redundant rows, if the problem has a solution and 0 < ω < 2 (Luo and
+/// Tseng, SIAM J. Control Optim. 29, 1991, and J. Optim. Theory Appl. 72, 1992). y is then unique, the multipliers
+/// are not: they depend on the guess and on the order of the rows.
 ///
-/// A W that is not symmetric it takes as well, but the theorem is then for diagonally dominant W only (Cottle, Pang and
-/// Stone, The Linear Complementarity Problem, ch. 5, for H-matrices); weakly coupled rows are such. Where sweeps do not
+/// It accepts an unsymmetric W, but convergence is then proven only for diagonally dominant W, as for weakly coupled
+/// rows (Cottle, Pang and Stone, The Linear Complementarity Problem, ch. 5, for H-matrices). If the sweeps do not
 /// converge, it fails.
 ///
 /// A result is accepted by its residual: in every row `|min(y_i, W_ii λ_i)|` (`|y_i|` of a free row) is rounding or at
 /// most the tolerance times the largest |q_i|. A guess that is accepted is returned after 0 sweeps; one that is not
 /// finite is not used.
 ///
-/// A contact with friction is a block: in its turn it gets the multipliers that solve it alone, exactly. Sweeps begin
-/// at zero then, whatever the guess, and there is no theorem that they converge; on independent rows and with
-/// coefficients below 1 they have in every test, on redundant ones often not. Sweeps that do not end are
-/// [`ContactFailure::NotConverged`]; [`ContactFailure::Jammed`] names a contact apart from all others which is proven
-/// to have no solution.
+/// A contact with friction is a block, whose subproblem is solved exactly in its turn. Sweeps then start at zero,
+/// whatever the guess, and convergence is not proven: in every test they have converged on independent rows with
+/// coefficients below 1, on redundant rows often not. Sweeps that do not end are [`ContactFailure::NotConverged`];
+/// [`ContactFailure::Jammed`] names a contact uncoupled from all others that provably has no solution.
 ///
-/// Known weakness: convergence is linear, and the number of sweeps grows with the condition of W: stiff against soft,
-/// or long stacks, take thousands. The tolerance is one for all rows: small gaps beside large ones are less exact. A
-/// problem without a solution costs all sweeps granted before it fails.
+/// Known weakness: convergence is linear, and the number of sweeps grows with the condition of W: stiff against soft
+/// bodies, or long stacks, take thousands. One tolerance applies to all rows, so small gaps next to large ones are
+/// less accurate. A problem without a solution uses all allowed sweeps before it fails.
 ///
 /// ```
 /// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
@@ -62,7 +61,7 @@ impl<T: Real> Default for GaussSeidel<T> {
 }
 
 impl<T: Real> GaussSeidel<T> {
-    /// With relaxation factor ω: 1 by default, more may save sweeps where rows are strongly coupled.
+    /// With relaxation factor ω: 1 by default; larger values may save sweeps if rows are strongly coupled.
     ///
     /// # Errors
     ///
@@ -108,7 +107,7 @@ impl<T: Real> GaussSeidel<T> {
     }
 }
 
-/// A row without friction closes its gap, as far as its multiplier may; without W_ii it is left out.
+/// Closes the gap of a row without friction within the bounds of its multiplier; a row without W_ii is skipped.
 fn relax_row<T: Real>(
     problem: &ContactProblem<'_, T>,
     (row, set): (usize, AdmissibleSet),
@@ -122,7 +121,7 @@ fn relax_row<T: Real>(
     }
 }
 
-/// One sweep with relaxation factor `omega`; rows without W_ii are left out.
+/// One sweep with relaxation factor `omega`; rows without W_ii are skipped.
 pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
     for (i, &set) in problem.sets.iter().enumerate() {
         relax_row(problem, (i, set), omega, multipliers);
@@ -130,7 +129,7 @@ pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, mul
 }
 
 impl<T: Real> ContactSolver<T> for GaussSeidel<T> {
-    /// All of them.
+    /// All sets are supported.
     fn admits(&self, _set: AdmissibleSet) -> bool {
         true
     }

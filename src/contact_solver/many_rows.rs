@@ -1,10 +1,9 @@
-//! Equality problems of many active rows, W_AA x = b, by conjugate gradients: nothing here costs the cube of their
-//! number.
+//! Equality problems of many active rows, W_AA x = b, by conjugate gradients, without cubic cost.
 //!
-//! The preconditioner is a factorized sparse approximate inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14,
-//! 1993): H with a few entries a row, such that H W Hᵀ is near the identity. A contact feels its neighbors most, so
-//! that a row of H needs no more than the rows of W that are largest beside its own; iterations do then not grow with
-//! the number of rows.
+//! The preconditioner is a factorized sparse approximate inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl.
+//! 14, 1993): H with a few entries per row, such that H W Hᵀ is near the identity. A contact is coupled most to its
+//! neighbors, so a row of H needs only the rows of W with the largest coupling to its own; the number of iterations
+//! then does not grow with the number of rows.
 
 use super::ContactProblem;
 use super::extents::Extents;
@@ -14,41 +13,41 @@ use crate::real::Real;
 /// Entries in a row of the approximate inverse, at most.
 const WIDTH: usize = 20;
 
-/// Iterations granted; where they do not end the dense factor takes over.
+/// Iteration limit; beyond it the dense factor is used.
 const ITERATIONS: usize = 300;
 
-/// Times conjugate gradients begin again at the residual that rounding has left.
+/// Restarts of conjugate gradients from the recomputed residual.
 const REFINEMENTS: usize = 3;
 
-/// Roundings of its own terms by which an equation may be missed.
+/// Tolerated residual of an equation, in roundings of its terms.
 const ROUNDINGS: f64 = 4.0;
 
-/// W on the active rows, with the approximate inverse of it.
+/// W on the active rows, with its approximate inverse.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ManyRows<T> {
-    /// H by rows: where each begins, and the places (in the list of active rows) and values of its entries.
+    /// H by rows: the start of each row, and the places (in the list of active rows) and values of its entries.
     starts: Vec<usize>,
     places: Vec<usize>,
     values: Vec<T>,
     /// 1/√W_ii of the active rows.
     scale: Vec<T>,
-    /// How near each row before is, while a row of H is chosen.
+    /// Coupling to each earlier row, while a row of H is chosen.
     near: Vec<(T, usize)>,
-    /// Lower factor of the block of W that a row of H belongs to, row by row.
+    /// Lower factor of the block of W for a row of H, row by row.
     block: Vec<T>,
-    /// Vectors of the iteration, one entry an active row: residual, preconditioned residual, H r, b.
+    /// Vectors of the iteration, one entry per active row: residual, preconditioned residual, H r, b.
     residual: Vec<T>,
     pushed: Vec<T>,
     inner: Vec<T>,
     right: Vec<T>,
-    /// Direction and its product, one entry a row of the problem.
+    /// Direction and its product, one entry per row of the problem.
     direction: Vec<T>,
     product: Vec<T>,
 }
 
 impl<T: Real> ManyRows<T> {
-    /// Forms the approximate inverse for the active `rows` (ascending). Says whether there is one: not if some row
-    /// depends on its neighbors.
+    /// Computes the approximate inverse for the active `rows` (ascending). Returns false if some row depends on its
+    /// neighbors.
     pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) -> bool {
         let Self { starts, places, values, scale, near, block, .. } = self;
         starts.clear();
@@ -56,7 +55,7 @@ impl<T: Real> ManyRows<T> {
         values.clear();
         scale.clear();
         starts.push(0);
-        // What a pivot, of a block with a unit diagonal, must exceed.
+        // Lower bound of a pivot, in a block scaled to a unit diagonal.
         let least = T::epsilon().sqrt();
         for (k, &row) in rows.iter().enumerate() {
             let own = problem.row(row);
@@ -69,7 +68,7 @@ impl<T: Real> ManyRows<T> {
             let before = rows[first..k].iter().zip(&scale[first..]).zip(first..);
             near.extend(before.map(|((&i, &s), j)| ((own[i] * s).abs(), j)));
             if near.len() >= WIDTH {
-                // The nearest; of two at the same distance the first.
+                // The most coupled rows; of equal ones the first.
                 let order = |a: &(T, usize), b: &(T, usize)| b.0.value().total_cmp(&a.0.value()).then(a.1.cmp(&b.1));
                 near.select_nth_unstable_by(WIDTH - 2, order);
                 near.truncate(WIDTH - 1);
@@ -103,8 +102,8 @@ impl<T: Real> ManyRows<T> {
         true
     }
 
-    /// Solves for `x`, which holds b on entry, to rounding. Returns the iterations, or nothing where they do not end; x
-    /// is then b still.
+    /// Solves for `x`, which holds b on entry, to rounding. Returns the number of iterations, or `None` if they do
+    /// not end; x is then still b.
     pub(super) fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -133,7 +132,7 @@ impl<T: Real> ManyRows<T> {
             if solved {
                 break;
             }
-            // As far as the recurrence can tell.
+            // As accurate as the recurrence allows.
             let goal = T::epsilon() * T::of(0.25) * start;
             match self.iterate((problem, extents), rows, x, goal, ITERATIONS - iterations) {
                 Some(spent) => iterations += spent,
@@ -148,12 +147,12 @@ impl<T: Real> ManyRows<T> {
         solved.then_some(iterations)
     }
 
-    /// The norm of the residual, rows measured by the roots of their diagonal.
+    /// The norm of the residual, with rows scaled by the roots of their diagonal.
     fn norm(&self) -> T {
         self.residual.iter().zip(&self.scale).map(|(&r, &s)| (r * s) * (r * s)).sum::<T>().sqrt()
     }
 
-    /// Adds to x until the residual is at most `goal`.
+    /// Updates x until the residual is at most `goal`.
     fn iterate(
         &mut self,
         (problem, extents): (&ContactProblem<'_, T>, &Extents),
@@ -176,7 +175,7 @@ impl<T: Real> ManyRows<T> {
             }
             self.multiply(problem, extents, rows);
             let curvature = rows.iter().map(|&row| self.direction[row] * self.product[row]).sum::<T>();
-            // W is not definite along the direction, or nothing is a number.
+            // W is not positive definite along the direction, or a value is NaN.
             let sound = curvature > T::zero() && now > T::zero();
             if !sound {
                 return None;
@@ -206,7 +205,7 @@ impl<T: Real> ManyRows<T> {
         }
     }
 
-    /// The product of W with the direction, in the active rows. Of W the lower triangle is read alone.
+    /// The product of W with the direction on the active rows. Only the lower triangle of W is read.
     fn multiply(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) {
         let Self { direction, product, .. } = self;
         product.fill(T::zero());
@@ -219,7 +218,7 @@ impl<T: Real> ManyRows<T> {
         }
     }
 
-    /// The residual as it is; says whether every equation is met to the rounding of its terms.
+    /// Recomputes the residual; returns whether every equation is met to the rounding of its terms.
     fn refresh(
         &mut self,
         (problem, extents): (&ContactProblem<'_, T>, &Extents),
@@ -245,7 +244,7 @@ impl<T: Real> ManyRows<T> {
     }
 }
 
-/// Cholesky of a block with a unit diagonal into `l`, row by row; whether every pivot exceeds `least`.
+/// Cholesky factor of a block with a unit diagonal into `l`, row by row; returns whether every pivot exceeds `least`.
 fn factorize<T: Real>(members: &[usize], entry: impl Fn(usize, usize) -> T, least: T, l: &mut Vec<T>) -> bool {
     let size = members.len();
     l.clear();
@@ -274,7 +273,7 @@ mod tests {
     use crate::contact_solver::AdmissibleSet;
     use crate::dense::DenseCholesky;
 
-    /// The flexibility of nodes on a square grid: falls off with their distance, as that of a body's surface.
+    /// The flexibility of nodes on a square grid: decays with their distance, as on the surface of a body.
     fn flexibility(side: usize, range: f64) -> Vec<f64> {
         let n = side * side;
         let place = |i: usize| [(i % side) as f64, (i / side) as f64];
@@ -323,7 +322,7 @@ mod tests {
     fn dependent_rows_are_left_to_the_dense_factor() {
         let (side, n) = (6, 36);
         let mut w = flexibility(side, 2.0);
-        // Row 20 is row 19 once more.
+        // Row 20 equals row 19.
         for j in 0..n {
             w[20 * n + j] = w[19 * n + j];
         }

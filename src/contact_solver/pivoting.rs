@@ -1,4 +1,4 @@
-//! Principal pivoting: exact for every positive semi-definite W, and the proof where there is no solution.
+//! Principal pivoting: exact for every positive semi-definite W, with a proof if there is no solution.
 
 use super::acceptance::Settings;
 use super::gauss_seidel::sweep_rows;
@@ -6,33 +6,34 @@ use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::dense::dot;
 use crate::real::Real;
 
-/// Principal pivoting on the dense Delassus operator, redundant rows included: the reference solver.
+/// Principal pivoting on the dense Delassus operator, including redundant rows: the reference solver.
 ///
-/// The method of Dantzig, van de Panne and Whinston for symmetric W (Cottle, Pang and Stone, The Linear Complementarity
-/// Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). Free rows become active
-/// first. Then the row p that is violated most is driven: λ_p grows, the active rows keep y = 0, until
+/// The method of Dantzig, van de Panne and Whinston for symmetric W (Cottle, Pang and Stone, The Linear
+/// Complementarity Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). Free
+/// rows become active first. Then the most violated row p is driven: λ_p grows, while the active rows keep y = 0,
+/// until
 ///
 /// * y_p = 0: p becomes active, or
 /// * an active λ_j = 0: j leaves, and p is driven on, or
-/// * neither: λ grows along a direction d with W d = 0, qᵀ d < 0 and d ≥ 0 on unilateral rows. No λ makes y ≥ 0 then,
-///   as dᵀ y = dᵀ q: the problem has no solution, and p is named.
+/// * neither: λ grows along a direction d with W d = 0, qᵀ d < 0 and d ≥ 0 on unilateral rows. Then no λ makes y ≥ 0,
+///   as dᵀ y = dᵀ q: the problem has no solution, and the error names p.
 ///
-/// That is finite, and ties need no rule: rows leave at most until none is left, then p becomes active with λ_p > 0,
-/// and ½ λᵀ W λ + qᵀ λ has fallen. It is the minimum over the active rows, hence no active set comes twice. A row
-/// enters only where it is independent of the active ones, so the active block is positive definite for every
-/// semi-definite W, and its Cholesky factor is kept up to date row by row. Multipliers are solved for anew at each
-/// pivot from W and q, with iterative refinement; nothing drifts.
+/// This is finite, and ties need no rule: rows leave at most until none is left, then p becomes active with λ_p > 0,
+/// and ½ λᵀ W λ + qᵀ λ has fallen. That energy is minimal over the active rows, so no active set repeats. Only rows
+/// independent of the active ones enter, so the active block is positive definite for every semi-definite W; its
+/// Cholesky factor is updated row by row. At each pivot the multipliers are solved again from W and q, with iterative
+/// refinement, so errors do not accumulate.
 ///
-/// A pivot costs O(n²), a problem as a rule O(n³), with about a pivot for each active row; up to a few hundred rows. Of
-/// several solutions it finds a basic one: the rows with λ ≠ 0 are independent. Only if these are so nearly dependent
-/// that the residual is more than rounding, sweeps of Gauss–Seidel spread the load to the rows they imply. It does not
-/// use the guess, so the multipliers never depend on it.
+/// A pivot costs O(n²) and a problem usually O(n³), with about one pivot per active row; suitable up to a few hundred
+/// rows. Of several solutions it finds a basic one: the rows with λ ≠ 0 are independent. Only if these are so nearly
+/// dependent that the residual exceeds rounding, Gauss–Seidel sweeps spread the load to the implied rows. The guess
+/// is not used, so the multipliers never depend on it.
 ///
-/// A W that is not symmetric is refused ([`ContactFailure::Unsymmetric`]): the factor is a Cholesky factor, and the
-/// argument that no set comes twice needs an energy.
+/// An unsymmetric W is rejected ([`ContactFailure::Unsymmetric`]): the factor is a Cholesky factor, and the argument
+/// that no set repeats needs an energy.
 ///
-/// Known weakness: it gains nothing from steady contact; in the worst case pivots are exponentially many (never seen,
-/// and limited); a row whose independence is rounding counts as dependent.
+/// Known weakness: steady contact saves no work; in the worst case the number of pivots is exponential (never seen,
+/// and limited); a row that is independent only by rounding counts as dependent.
 ///
 /// ```
 /// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, Pivoting};
@@ -57,16 +58,16 @@ pub struct Pivoting<T = f64> {
     status: Vec<Status>,
 }
 
-/// Gauss–Seidel sweeps granted where the active block, though independent, is so badly conditioned that the rows it
-/// implies miss the acceptance rule: they share the load then, and the solution is not basic.
+/// Limit of Gauss–Seidel sweeps if the active block, though independent, is so badly conditioned that implied rows
+/// fail the acceptance rule: they then share the load, and the solution is not basic.
 const POLISH: usize = 1000;
 
-/// Where a row stands.
+/// State of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
     /// λ = 0.
     Inactive,
-    /// λ = 0, and y = 0 to the rounding of the rows now active.
+    /// λ = 0, and y = 0 to the rounding of the present active rows.
     Implied,
     /// y = 0.
     Active,
@@ -79,19 +80,19 @@ struct Basis<T> {
     /// Row-major lower triangle; stride = size of the problem.
     factor: Vec<T>,
     stride: usize,
-    /// Of the row that is driven: its row of the factor, if it entered.
+    /// Row of the factor that the driven row would get on entering.
     entry: Vec<T>,
     /// Change of the active multipliers for a unit change of the driven one.
     direction: Vec<T>,
     right: Vec<T>,
 }
 
-/// How the gap of the driven row answers to its multiplier.
+/// Response of the gap of the driven row to its multiplier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Response<T> {
     /// ∂y_p/∂λ_p; zero if the row depends on the active ones.
     slope: T,
-    /// What of the direction's entries, times √W_jj, is rounding.
+    /// Rounding of the direction's entries, times √W_jj.
     noise: T,
 }
 
@@ -141,21 +142,22 @@ impl<T: Real> Basis<T> {
         direction.clear();
         direction.extend(entry.iter().map(|&x| -x));
         Self::backward(factor, *stride, direction);
-        // The slope is rᵀ W r with r = (direction, 1): the rounding of W comes out multiplied with r twice.
+        // The slope is rᵀ W r with r = (direction, 1): the rounding of W is multiplied by r twice.
         let slope = row[p] - dot(entry, entry);
         let size = |(&j, r): (&usize, &T)| problem.delassus(j, j).sqrt() * r.abs();
         let length = row[p].sqrt() + rows.iter().zip(direction.iter()).map(size).sum::<T>();
         let dependent = slope <= T::of(32.0) * T::epsilon() * length * length;
-        // A direction is known to the rounding of W times its condition; a pivot on less would invent huge multipliers.
+        // A direction is known to the rounding of W times its condition; a smaller pivot would produce huge
+        // multipliers.
         Response {
             slope: if dependent { T::zero() } else { slope },
             noise: T::epsilon().powf(T::of(2.0 / 3.0)) * length,
         }
     }
 
-    /// All independent free rows become active: Cholesky with diagonal pivoting, the most independent row first.
+    /// Makes all independent free rows active: Cholesky with diagonal pivoting, the most independent row first.
     ///
-    /// The rows left out are combinations of these; whether their q agrees is for the acceptance rule to say.
+    /// The remaining free rows are combinations of these; the acceptance rule checks whether their q is consistent.
     fn enter_free(&mut self, problem: &ContactProblem<'_, T>) {
         let Self { rows, factor, stride, right: rest, .. } = self;
         let is_free = |&i: &usize| problem.sets[i] == AdmissibleSet::Free && problem.delassus(i, i) > T::zero();
@@ -186,7 +188,7 @@ impl<T: Real> Basis<T> {
         }
     }
 
-    /// The driven row becomes active.
+    /// Makes the driven row active.
     fn enter(&mut self, p: usize, slope: T) {
         let start = self.rows.len() * self.stride;
         let row = self.factor[start..].iter_mut();
@@ -196,7 +198,7 @@ impl<T: Real> Basis<T> {
         self.rows.push(p);
     }
 
-    /// The k-th active row leaves: its row of the factor is dropped, and rotations restore the triangle.
+    /// Removes the k-th active row: its row of the factor is dropped, and rotations restore the triangle.
     fn leave(&mut self, k: usize) -> usize {
         let Self { rows, factor, stride, .. } = self;
         let row = rows.remove(k);
@@ -219,10 +221,10 @@ impl<T: Real> Basis<T> {
         row
     }
 
-    /// Solves y = 0 on the active rows; the other multipliers stay.
+    /// Solves y = 0 on the active rows; other multipliers are unchanged.
     fn close(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) {
         let Self { rows, factor, stride, right, .. } = self;
-        // The second pass is iterative refinement.
+        // The second iteration is iterative refinement.
         for _ in 0..2 {
             right.clear();
             right.extend(rows.iter().map(|&i| problem.gap(i, multipliers)));
@@ -234,27 +236,27 @@ impl<T: Real> Basis<T> {
         }
     }
 
-    /// What of y_p is rounding: its own, and that of the active rows as their multipliers carry it over.
+    /// Rounding of y_p: its own, plus the rounding carried over by the active rows.
     fn rounding(&self, problem: &ContactProblem<'_, T>, p: usize, multipliers: &[T]) -> T {
         let carried = self.rows.iter().zip(&self.direction).map(|(&j, r)| r.abs() * problem.rounding(j, multipliers));
         problem.rounding(p, multipliers) + carried.sum::<T>()
     }
 
-    /// The active row that presses hardest against the driven one.
+    /// The active row that acts most against the driven one.
     fn opponent(&self, problem: &ContactProblem<'_, T>, p: usize) -> usize {
         let size = |k: usize| self.direction[k].abs() * problem.delassus(self.rows[k], self.rows[k]).sqrt();
         let hardest = (0..self.rows.len()).reduce(|hardest, k| if size(k) > size(hardest) { k } else { hardest });
         hardest.map_or(p, |k| self.rows[k])
     }
 
-    /// How far λ_p can grow before an active multiplier is zero, and which (by position).
+    /// The largest growth of λ_p before an active multiplier is zero, and the position of that row.
     fn blocking(&self, problem: &ContactProblem<'_, T>, noise: T, multipliers: &[T]) -> Option<(usize, T)> {
         let mut first: Option<(usize, T, T)> = None;
         for (k, (&j, &r)) in self.rows.iter().zip(&self.direction).enumerate() {
             let pivot = -r * problem.delassus(j, j).sqrt();
             if problem.sets[j] == AdmissibleSet::NonNegative && pivot > noise {
                 let step = multipliers[j].max(T::zero()) / -r;
-                // Of ties the largest pivot, for accuracy.
+                // Among ties the largest pivot, for accuracy.
                 if first.is_none_or(|(_, least, largest)| step < least || (step == least && pivot > largest)) {
                     first = Some((k, step, pivot));
                 }
@@ -265,7 +267,7 @@ impl<T: Real> Basis<T> {
 }
 
 impl<T: Real> Pivoting<T> {
-    /// The row that is violated most, measured in √W_ii.
+    /// The most violated row, scaled by √W_ii.
     fn violated(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> Option<usize> {
         let mut worst: Option<(usize, T)> = None;
         for i in 0..problem.size() {
@@ -284,7 +286,7 @@ impl<T: Real> Pivoting<T> {
         worst.map(|(i, _)| i)
     }
 
-    /// Drives row p until it is active, or found to be implied; `pivots` counts on, up to `limit`.
+    /// Drives row p until it is active or found to be implied; adds to `pivots`, up to `limit`.
     fn drive(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -323,7 +325,7 @@ impl<T: Real> Pivoting<T> {
                     basis.enter(p, slope);
                     status[p] = Status::Active;
                     basis.close(problem, multipliers);
-                    // Another active set: what the old one implied is open again.
+                    // The active set has changed, so implied rows are checked again.
                     for status in status.iter_mut().filter(|status| **status == Status::Implied) {
                         *status = Status::Inactive;
                     }
@@ -355,7 +357,7 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
             self.status[row] = Status::Active;
         }
         let mut pivots = self.basis.rows.len();
-        // Far above anything seen.
+        // Far above any observed count.
         let limit = 100 + 20 * size;
         while pivots < limit {
             match self.violated(problem, multipliers) {

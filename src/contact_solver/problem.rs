@@ -7,7 +7,8 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use std::ops::Range;
 
-/// The set that the multipliers of a block of rows belong to, which says what they and the block's y are to each other.
+/// The set of the multipliers of a block of rows, which also determines the conditions between them and the block's
+/// y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AdmissibleSet {
@@ -15,25 +16,25 @@ pub enum AdmissibleSet {
     NonNegative,
     /// A row with y = 0, and λ of either sign.
     Free,
-    /// A contact with Coulomb's friction in a plane: a normal row with 0 ≤ y_n ⊥ p ≥ 0, and a tangential one.
-    /// |f| ≤ μ p, and y_t, the slip, is zero or opposes f, which is then on the rim of the cone: y_t = −γ f, γ ≥ 0,
-    /// γ (μ p − |f|) = 0. (This is no condition of a minimum: where it slides y_n is zero, not −μ |y_t|.)
+    /// A contact with Coulomb friction in a plane: a normal row with 0 ≤ y_n ⊥ p ≥ 0 and a tangential row with |f| ≤
+    /// μ p. The slip y_t is zero, or opposes f on the boundary of the cone: y_t = −γ f, γ ≥ 0, γ (μ p − |f|) = 0.
+    /// This is not the condition of a minimum: in sliding y_n is zero, not −μ |y_t|.
     Cone2 {
         /// μ, from 0.
         friction: f64,
     },
-    /// The same in space: a normal row, and two tangential ones along orthonormal directions.
+    /// The same in space: a normal row and two tangential rows along orthonormal directions.
     Cone3 {
         /// μ, from 0.
         friction: f64,
     },
-    /// A contact in a plane that does not open: y_n = 0, with p of either sign. |f| ≤ μ max(0, p), and the slip is zero
-    /// or opposes f, as in [`Cone2`](Self::Cone2). Corrections of contacts that are closed ask for it.
+    /// A contact in a plane that does not open: y_n = 0, with p of either sign. |f| ≤ μ max(0, p), and the slip is
+    /// zero or opposes f, as in [`Cone2`](Self::Cone2). Corrections of closed contacts use it.
     Held2 {
         /// μ, from 0.
         friction: f64,
     },
-    /// The same in space, as [`Cone3`](Self::Cone3).
+    /// The same in space, like [`Cone3`](Self::Cone3).
     Held3 {
         /// μ, from 0.
         friction: f64,
@@ -41,7 +42,7 @@ pub enum AdmissibleSet {
 }
 
 impl AdmissibleSet {
-    /// The sets that laws ask for.
+    /// The sets of the contact laws.
     pub(crate) const OF_LAWS: [Self; 2] = [Self::NonNegative, Self::Free];
 
     /// The number of rows of a block.
@@ -64,13 +65,12 @@ impl AdmissibleSet {
         }
     }
 
-    /// Whether the only row of a block, or its normal one, has y = 0 and a multiplier of either sign.
+    /// Whether the only or the normal row of a block has y = 0 and a multiplier of either sign.
     pub(crate) fn is_bilateral(self) -> bool {
         matches!(self, Self::Free | Self::Held2 { .. } | Self::Held3 { .. })
     }
 
-    /// The set of a contact with friction in so many tangential directions, 1 or 2: a cone, or of a contact that does
-    /// not open.
+    /// The set of a contact with friction in 1 or 2 tangential directions; bilateral if the contact does not open.
     pub(crate) fn with_friction(friction: f64, tangents: usize, is_bilateral: bool) -> Self {
         match (tangents, is_bilateral) {
             (0 | 1, false) => Self::Cone2 { friction },
@@ -123,11 +123,11 @@ impl AdmissibleSet {
         }
     }
 
-    /// By how much the y and the multipliers of a block miss their conditions (unit of y): |min(y, W_ii λ)|, or |y| of
-    /// a free row; NaN if y is not finite. `compliance` is the diagonal of W.
+    /// Residual of a block (unit of y): |min(y, W_ii λ)|, or |y| of a free row; NaN if y is not finite. `compliance`
+    /// is the diagonal of W.
     ///
-    /// Of a cone the larger one of |min(y_n, W_nn p)| (|y_n| where it does not open) and of |W_t f − P(W_t f − y_t)|,
-    /// with P the nearest point of the disc of radius W_t μ max(0, p) and W_t the larger one of the tangential rows
+    /// For a cone, the larger one of |min(y_n, W_nn p)| (|y_n| if bilateral) and |W_t f − P(W_t f − y_t)|, with P the
+    /// projection onto the disc of radius W_t μ max(0, p) and W_t the largest diagonal entry of the tangential rows
     /// (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
         if let Some(friction) = self.friction() {
@@ -137,7 +137,7 @@ impl AdmissibleSet {
         }
         let rows = y.iter().zip(multipliers).zip(compliance);
         let misses = rows.map(|((&y, &multiplier), &compliance)| match self {
-            // (`min` would prefer any number to NaN.)
+            // `min` would ignore NaN.
             _ if !y.is_finite() => T::nan(),
             Self::Free => y.abs(),
             _ => y.min(compliance * multiplier).abs(),
@@ -146,7 +146,7 @@ impl AdmissibleSet {
     }
 }
 
-/// [`AdmissibleSet::residual`] of a cone, by its normal and its tangential rows.
+/// [`AdmissibleSet::residual`] of a cone, split into normal and tangential rows.
 fn cone_residuals<T: Real>(
     (friction, is_bilateral): (T, bool),
     y: &[T],
@@ -188,11 +188,11 @@ impl From<ContactLaw> for AdmissibleSet {
     }
 }
 
-/// Find λ with `y = W λ + q`, such that y and λ of every block meet the conditions of its [`AdmissibleSet`].
+/// Find λ with `y = W λ + q` such that y and λ of every block satisfy the conditions of its [`AdmissibleSet`].
 ///
 /// W is the Delassus operator (positive semidefinite; definite on independent rows), with the compliances of the laws
-/// on its diagonal. It is as symmetric as the effective matrix A: W = G A⁻¹ Gᵀ. y has the unit of a gap, and so have
-/// the tolerances: a residual compares y_i with W_ii λ_i, never meters with newtons.
+/// on its diagonal. It is symmetric if the effective matrix A is: W = G A⁻¹ Gᵀ. y and the tolerances have the unit of
+/// a gap: a residual compares y_i with W_ii λ_i, never meters with newtons.
 ///
 /// ```
 /// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
@@ -214,13 +214,13 @@ pub struct ContactProblem<'a, T> {
 }
 
 impl<'a, T: Real> ContactProblem<'a, T> {
-    /// From W row by row (entry (i, j), what λ_j adds to y_i, is at `i · size + j`), the offset q (y at λ = 0), the set
-    /// of every block, and for each row the size of y that is rounding.
+    /// From W row by row (entry (i, j), the change of y_i per λ_j, is at `i · size + j`), the offset q (y at λ = 0),
+    /// the set of every block, and the rounding of y in each row.
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] if the lengths do not fit each other, [`Error::Parameter`] for a friction coefficient that
-    /// is negative or not finite.
+    /// [`Error::Dimension`] if the lengths disagree, [`Error::Parameter`] for a friction coefficient that is negative
+    /// or not finite.
     pub fn new(delassus: &'a [T], offset: &'a [T], sets: &'a [AdmissibleSet], tolerance: &'a [T]) -> Result<Self> {
         let size = offset.len();
         let rows = sets.iter().map(|set| set.rows()).sum();
@@ -241,7 +241,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         Ok(Self::of(delassus, offset, sets, tolerance, 0))
     }
 
-    /// The same, of parts that fit each other.
+    /// The same for consistent parts.
     pub(crate) fn of(
         delassus: &'a [T],
         offset: &'a [T],
@@ -252,8 +252,8 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         Self { delassus, offset, sets, tolerance, version }
     }
 
-    /// With a number that changes whenever W does: what a solver has computed from W serves it again while the number
-    /// is the same. 0, the default, says nothing.
+    /// Sets a number that changes whenever W does: a solver reuses data computed from W while it is the same. With 0,
+    /// the default, nothing is reused.
     #[must_use]
     pub fn with_version(self, version: u64) -> Self {
         Self { version, ..self }
@@ -264,17 +264,17 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         self.version
     }
 
-    /// q: y at λ = 0, one a row.
+    /// q: y at λ = 0, one per row.
     pub fn offset(&self) -> &'a [T] {
         self.offset
     }
 
-    /// For each row the size of y that is rounding.
+    /// The rounding of y in each row.
     pub fn tolerance(&self) -> &'a [T] {
         self.tolerance
     }
 
-    /// The blocks, one after the other: their rows, and the sets of their multipliers.
+    /// The consecutive blocks: their rows, and the sets of their multipliers.
     pub fn blocks(&self) -> impl Iterator<Item = (Range<usize>, AdmissibleSet)> + 'a {
         self.sets.iter().scan(0, |first, &set| {
             let rows = *first..*first + set.rows();
@@ -303,13 +303,13 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         self.offset[i] + dot(self.row(i), multipliers)
     }
 
-    /// What of y_i is rounding: its tolerance, and that of the sum `(W λ + q)_i` itself.
+    /// Rounding of y_i: its tolerance, plus the rounding of the sum `(W λ + q)_i`.
     pub fn rounding(&self, i: usize, multipliers: &[T]) -> T {
         let terms = self.row(i).iter().zip(multipliers).map(|(&w, &lambda)| (w * lambda).abs());
         self.rounding_of(i, self.offset[i].abs() + terms.sum::<T>())
     }
 
-    /// The same of multipliers that are zero.
+    /// The same for zero multipliers.
     pub(super) fn rounding_idle(&self, i: usize) -> T {
         self.rounding_of(i, self.offset[i].abs())
     }
@@ -318,8 +318,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         self.tolerance[i] + T::of(32.0) * T::epsilon() * terms
     }
 
-    /// The row, or first row of a block, that misses its conditions most, and by how much (unit of y): the largest
-    /// [`AdmissibleSet::residual`].
+    /// The row, or first row of a block, with the largest [`AdmissibleSet::residual`], and that residual (unit of y).
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
         let worst = |worst: (usize, T), (row, miss): (usize, T)| if miss > worst.1 { (row, miss) } else { worst };
         let misses = self.blocks().map(|(rows, set)| {
@@ -329,7 +328,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         misses.fold((0, T::zero()), worst)
     }
 
-    /// By how much the rows of a block miss the conditions of its set: the first, and the tangential ones.
+    /// Residuals of the rows of a block: the first row, and the tangential rows.
     pub(super) fn block_misses(&self, rows: Range<usize>, set: AdmissibleSet, multipliers: &[T]) -> [T; 2] {
         let (mut y, mut compliance) = ([T::zero(); 3], [T::zero(); 3]);
         for (k, row) in rows.clone().enumerate() {
@@ -342,7 +341,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         }
     }
 
-    /// By how much row i misses the conditions of its set, in a problem whose sets have one row each.
+    /// Residual of row i, in a problem whose sets have one row each.
     pub(super) fn miss(&self, i: usize, multipliers: &[T]) -> T {
         self.sets[i].residual(&[self.gap(i, multipliers)], &[multipliers[i]], &[self.delassus(i, i)])
     }

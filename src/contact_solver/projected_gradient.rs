@@ -1,4 +1,4 @@
-//! Accelerated projected gradient: all rows at once, for many coupled rows.
+//! Accelerated projected gradient: updates all rows at once, for many coupled rows.
 
 use super::acceptance::Settings;
 use super::{ContactFailure, ContactProblem, ContactSolver};
@@ -8,24 +8,24 @@ use crate::real::Real;
 /// Nesterov's accelerated projected gradient with adaptive restart, in variables scaled with √W_ii.
 ///
 /// It minimizes ½ λᵀ W λ + qᵀ λ over the admissible λ. Mazhar, Heyn, Negrut and Tasora (ACM Trans. Graph. 34, 2015)
-/// brought it to contact; momentum is dropped whenever it points uphill (gradient restart of O'Donoghue and Candès,
-/// Found. Comput. Math. 15, 2015). In the scaled variables D^{-½} W D^{-½} has a unit diagonal, hence an
-/// eigenvalue bound L between 1 and n whatever the units. The scaled matrix is never formed: scaling changes the
-/// gradient to y_i / W_ii and the inner products to Σ W_ii a_i b_i. L starts at 1 and is doubled where the step proves
-/// too long, up to a bound that always holds (the largest row sum).
+/// applied it to contact; momentum is dropped whenever it points uphill (gradient restart of O'Donoghue and Candès,
+/// Found. Comput. Math. 15, 2015). In the scaled variables D^{-½} W D^{-½} has a unit diagonal, so its eigenvalue
+/// bound L is between 1 and n in any units. The scaled matrix is never formed: scaling changes the gradient to y_i /
+/// W_ii and the inner products to Σ W_ii a_i b_i. L starts at 1 and is doubled when a step is too long, up to a bound
+/// that always holds (the largest row sum).
 ///
-/// An iteration costs one product with W, O(n²), and the order of the rows does not matter, unlike in
-/// [`GaussSeidel`](super::GaussSeidel). Redundant rows do no harm: the acceleration converges for every positive
-/// semi-definite W if the problem has a solution (restarts save iterations; with them convergence is experience). y is
-/// then unique, the multipliers are not: with free rows only it finds the solution nearest to the guess in the norm
-/// √(Σ W_ii λ_i²), from zero the smallest one; with unilateral rows one near it, which depends on the guess.
+/// An iteration costs one product with W, O(n²); unlike in [`GaussSeidel`](super::GaussSeidel) the order of the rows
+/// does not matter. Redundant rows are allowed: the acceleration converges for every positive semi-definite W if the
+/// problem has a solution. Restarts save iterations; with them convergence is observed, not proven. y is then unique,
+/// the multipliers are not: with free rows only it finds the solution nearest to the guess in the norm √(Σ W_ii
+/// λ_i²), from zero the smallest one; with unilateral rows one near it, which depends on the guess.
 ///
-/// The acceptance rule is that of `GaussSeidel`, as is the treatment of the guess. A W that is not symmetric is refused
-/// ([`ContactFailure::Unsymmetric`]): there is nothing to minimize.
+/// The acceptance rule and the treatment of the guess are the same as in `GaussSeidel`. An unsymmetric W is rejected
+/// ([`ContactFailure::Unsymmetric`]): there is no function to minimize.
 ///
-/// Known weakness: iterations grow with the root of the condition of W (Gauss–Seidel: with the condition), and the last
-/// digits come slowly where contacts are about to open. The tolerance is one for all rows: small gaps beside large ones
-/// are less exact. A problem without a solution costs all iterations granted before it fails.
+/// Known weakness: iterations grow with the root of the condition of W (Gauss–Seidel: with the condition), and the
+/// last digits converge slowly if contacts are about to open. One tolerance applies to all rows, so small gaps next
+/// to large ones are less accurate. A problem without a solution uses all allowed iterations before it fails.
 ///
 /// ```
 /// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, ProjectedGradient};
@@ -55,10 +55,10 @@ struct Memory<T> {
     inverse: Vec<T>,
     /// y of the iterate.
     gaps: Vec<T>,
-    /// The iterate before.
+    /// The previous iterate.
     old: Vec<T>,
     old_gaps: Vec<T>,
-    /// The iterate with momentum, where the gradient is taken.
+    /// The extrapolated iterate, at which the gradient is evaluated.
     ahead: Vec<T>,
     ahead_gaps: Vec<T>,
 }
@@ -69,7 +69,7 @@ impl<T: Real> Memory<T> {
         [inverse, gaps, old, old_gaps, ahead, ahead_gaps]
     }
 
-    /// Begins at `multipliers`; returns a bound of L that always holds.
+    /// Starts at `multipliers`; returns a bound of L that always holds.
     fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> T {
         let size = problem.size();
         for vector in self.all() {
@@ -81,8 +81,8 @@ impl<T: Real> Memory<T> {
             let diagonal = problem.delassus(i, i);
             *inverse = if diagonal > T::zero() { diagonal.recip() } else { T::zero() };
         }
-        // Row sums of |D^{-½} W D^{-½}|; the trace is a bound too. (Roots of products: those of units of odd powers of
-        // two are rounded.)
+        // Row sums of |D^{-½} W D^{-½}|; the trace is a bound too. Roots of products are used, because roots of units
+        // that are odd powers of two are rounded.
         let scaled = |own: T, w: T, inverse: T| w.value().abs() * (own.value() * inverse.value()).sqrt();
         let sum = |i: usize| {
             let own = inverse[i];
@@ -97,7 +97,7 @@ impl<T: Real> Memory<T> {
         T::of(bound)
     }
 
-    /// The gradient step of length 1/L from the point ahead.
+    /// The gradient step of length 1/L from the extrapolated point.
     fn step(&mut self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &mut [T]) {
         for (i, lambda) in multipliers.iter_mut().enumerate() {
             let gradient = self.ahead_gaps[i] * self.inverse[i];
@@ -106,8 +106,8 @@ impl<T: Real> Memory<T> {
         evaluate(problem, multipliers, &mut self.gaps);
     }
 
-    /// Whether W bends no more than L along the step: then the step cannot overshoot. (Products of two small
-    /// differences may be below all numbers: one of them is taken as a share of the largest.)
+    /// Whether the curvature of W along the step is at most L, so that the step cannot overshoot. One of two small
+    /// differences is scaled by the largest, because their product may underflow.
     fn is_bounded(&self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &[T]) -> bool {
         let largest = farthest(&self.ahead, multipliers);
         if largest == 0.0 {
@@ -133,7 +133,7 @@ impl<T: Real> Memory<T> {
         largest > 0.0 && multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
     }
 
-    /// Goes on from the iterate, with this share of the last step as momentum.
+    /// Extrapolates from the iterate, with this share of the last step as momentum.
     fn advance(&mut self, momentum: T, multipliers: &[T]) {
         let points = self.ahead.iter_mut().zip(&mut self.old).zip(multipliers);
         let gaps = self.ahead_gaps.iter_mut().zip(&mut self.old_gaps).zip(&self.gaps);

@@ -1,31 +1,30 @@
-//! Sweeps over the blocks of a problem with cones: each in turn takes the multipliers that solve it while the others
-//! keep theirs.
+//! Sweeps over the blocks of a problem with cones: each block in turn is solved while the others keep their
+//! multipliers.
 
 use super::cone::Cone;
 use super::{AdmissibleSet, ContactProblem};
 use crate::real::Real;
 use std::ops::Range;
 
-/// The memory of sweeps. A symmetric W they read once, row by row up to the diagonal: what the blocks behind one do to
-/// it was summed when their rows were read, in the sweep before. A W is taken for symmetric until a result shows that
-/// it is not.
+/// The memory of sweeps. A symmetric W is read once per sweep, row by row up to the diagonal: the contributions of
+/// later blocks to a row were summed when their rows were read, in the previous sweep. W is taken as symmetric until
+/// a result shows that it is not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweeps<T> {
-    /// Whether W is symmetric, as far as sweeps care, if that is known.
+    /// Whether W is symmetric, if known.
     is_symmetric: Option<bool>,
-    /// Σ W λ over the blocks behind that of a row: of the multipliers that they have, and of those that this sweep
-    /// gives them.
+    /// Σ W λ over the blocks after each row: with their present multipliers, and with the ones from this sweep.
     behind: Vec<T>,
     next: Vec<T>,
 }
 
 impl<T: Real> Sweeps<T> {
-    /// Forgets what it knows of another problem.
+    /// Discards the symmetry of another problem.
     pub(super) fn reset(&mut self) {
         self.is_symmetric = None;
     }
 
-    /// Whether W was taken for symmetric, and is not; from then on it is read as a whole.
+    /// Whether W was taken as symmetric but is not; from then on all of it is read.
     pub(super) fn is_mistaken(&mut self, problem: &ContactProblem<'_, T>) -> bool {
         /// Roundings by which a symmetric W may differ across its diagonal.
         const ROUNDED: f64 = 64.0;
@@ -37,17 +36,17 @@ impl<T: Real> Sweeps<T> {
         !symmetric
     }
 
-    /// From the next sweep on reads W as a whole.
+    /// Reads all of W from the next sweep on.
     pub(super) fn read_all(&mut self) {
         self.is_symmetric = Some(false);
     }
 
-    /// Whether W is read up to its diagonal.
+    /// Whether W is read up to its diagonal only.
     fn reads_half(&self) -> bool {
         self.is_symmetric != Some(false)
     }
 
-    /// Begins with these multipliers.
+    /// Starts with these multipliers.
     pub(super) fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) {
         if self.reads_half() {
             for values in [&mut self.behind, &mut self.next] {
@@ -62,8 +61,8 @@ impl<T: Real> Sweeps<T> {
         }
     }
 
-    /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier, times its own compliance; NaN if one
-    /// is.
+    /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier times its own compliance; NaN if one
+    /// is NaN.
     pub(super) fn sweep(&mut self, problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
         let mut largest = T::zero();
         for (rows, set) in problem.blocks() {
@@ -75,7 +74,7 @@ impl<T: Real> Sweeps<T> {
             } else if block.delassus[0][0] > T::zero() {
                 solved[0] = -block.offset[0] / block.delassus[0][0];
             } else {
-                // Nothing moves its gap.
+                // No multiplier changes its gap.
                 solved[0] = own[0];
             }
             for (k, (multiplier, solved)) in own.iter_mut().zip(solved).enumerate() {
@@ -85,12 +84,12 @@ impl<T: Real> Sweeps<T> {
                     *multiplier = set.nearest(*multiplier);
                 }
                 let change = block.delassus[k][k] * (*multiplier - before).abs();
-                // (`max` would pass over NaN.)
+                // `max` would ignore NaN.
                 if change > largest || change.is_nan() {
                     largest = change;
                 }
             }
-            // (Relaxed beyond its solution a block may leave its cone.)
+            // An over-relaxed block may leave its cone.
             if omega > T::one() && set.friction().is_some() {
                 set.project(own);
             }
@@ -105,7 +104,7 @@ impl<T: Real> Sweeps<T> {
         largest
     }
 
-    /// A block while the others keep their multipliers.
+    /// A block with the others at their present multipliers.
     fn alone(
         &self,
         problem: &ContactProblem<'_, T>,
@@ -134,7 +133,7 @@ impl<T: Real> Sweeps<T> {
     }
 }
 
-/// A block while the others have no multipliers.
+/// A block with the others at zero.
 pub(super) fn free_block<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, set: AdmissibleSet) -> Cone<T> {
     let (size, friction) = (rows.len(), T::of(set.friction().unwrap_or(0.0)));
     let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
@@ -160,7 +159,7 @@ fn products<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multip
     sums
 }
 
-/// Adds what the multipliers of a block do to the rows before it.
+/// Adds the contributions of the multipliers of a block to the rows before it.
 fn spread<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multipliers: &[T], sums: &mut [T]) {
     let own = &multipliers[rows.clone()];
     if own.iter().all(|&multiplier| multiplier == T::zero()) {
@@ -179,7 +178,7 @@ fn spread<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, multipli
 mod tests {
     use super::*;
 
-    /// What a sweep says that it has changed is what it has changed, and NaN if that is.
+    /// The change returned by a sweep is the actual change, and NaN if that is NaN.
     #[test]
     fn a_sweep_says_its_largest_change() {
         let (w, tolerance) = ([2.0, 1.0, 1.0, 4.0], [1e-14; 2]);
@@ -188,7 +187,7 @@ mod tests {
             let problem = ContactProblem::of(&w, &offset, &sets, &tolerance, 0);
             let (mut sweeps, mut multipliers) = (Sweeps::default(), [0.0; 2]);
             sweeps.begin(&problem, &multipliers);
-            // (The second row is solved with the multiplier of the first one: 1 or 4.)
+            // The second row is solved with the multiplier of the first one: 1 or 4.
             let change: f64 = sweeps.sweep(&problem, 1.0, &mut multipliers);
             assert!((change - most).abs() < 1e-15, "{offset:?}: {change}");
         }

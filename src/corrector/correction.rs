@@ -525,7 +525,7 @@ impl<T: Real> Correction<'_, T> {
         let Buffers { damping, straight: rest, by_straight: moved, .. } = &mut **buffers;
         projection.apply_inverse(damping)?;
         let mut found = false;
-        // The groups are those of the problem that gave the forces.
+        // The groups belong to the problem that gave the forces.
         let groups = projection.groups();
         for group in (0..groups.len()).map(|group| groups.group(group)) {
             let largest = group.iter().fold(T::zero(), |largest, &position| rest[position].abs().max(largest));

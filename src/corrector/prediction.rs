@@ -15,7 +15,7 @@ pub struct Prediction<'a, T: Real> {
     /// Time between the previous state and the state of the stage.
     pub(crate) h: f64,
     pub(crate) t: f64,
-    /// Weight of the unknown in the displacements of the balance, divided by its weight in the displacements of the state.
+    /// Weight of the unknown in the displacements of the balance, relative to its weight in the state.
     pub(crate) balance_share: T,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) projection: &'a mut JumpProjection<T>,

@@ -14,7 +14,7 @@ pub(in crate::corrector) struct Rebounds<T> {
     /// The rate before the impact, and the required rate after it: zero if the contact is to stay.
     before: Vec<T>,
     target: Vec<T>,
-    /// The share of the targets that adds no energy.
+    /// The fraction of the target rates that adds no energy.
     share: T,
     /// The contacts that leave, ascending, and their tangential rows.
     leaving: Vec<usize>,
@@ -60,7 +60,7 @@ impl<T: Real> Rebounds<T> {
 }
 
 impl<T: Real> Correction<'_, T> {
-    /// Finds the contacts that close, under a law with restitution, fast enough not to return within a step.
+    /// Finds the contacts that close, under a law with restitution, fast enough not to return within two steps.
     ///
     /// The rate before the impact is evaluated at zero gap, from gap, rate and acceleration at the start of the
     /// stage: an elastic impact then conserves energy, including the potential energy of the remaining gap.
