@@ -1,7 +1,7 @@
-//! The pages in `docs/` whose programs are compiled and run with the tests of the documentation. (That of the errors is
-//! the documentation of [`Error`](crate::Error), and run there.)
+//! The pages in `docs/` whose programs are compiled and run as documentation tests. The page of the errors is the
+//! documentation of [`Error`](crate::Error) and is tested there.
 
-/// Takes pages into the documentation of nothing, which only its tests see.
+/// Includes pages as documentation of items that exist only for doctests.
 macro_rules! pages {
     ($($(#[$condition:meta])? $name:ident = $page:literal;)*) => {$(
         #[cfg(doctest)]
@@ -36,7 +36,7 @@ pages! {
 mod tests {
     use std::path::{Path, PathBuf};
 
-    /// README.md and all pages in docs/, by their path from the root of the package, with their text.
+    /// README.md and all pages in docs/: their paths from the root of the package, and their texts.
     fn pages() -> Vec<(String, String)> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let (mut folders, mut files) = (vec![root.join("docs")], vec![root.join("README.md")]);
@@ -54,7 +54,7 @@ mod tests {
         files.iter().map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
     }
 
-    /// Blocks of code of a page: what is said behind the opening marks, and the lines.
+    /// Code blocks of a page: the info string after the opening marks, and the lines.
     fn blocks(text: &str) -> Vec<(String, Vec<&str>)> {
         let (mut blocks, mut open) = (Vec::new(), None);
         for line in text.lines() {
@@ -88,7 +88,7 @@ mod tests {
         assert!(programs > 20);
     }
 
-    /// What is not marked as text would be compiled as Rust on the pages that are.
+    /// Rustdoc would compile an unmarked block of these pages as Rust.
     #[test]
     fn blocks_of_pages_say_what_they_are() {
         let here = include_str!("book.rs");

@@ -1,50 +1,50 @@
-//! Why a contact problem was not solved: plain data, which contact solvers return and errors carry.
+//! Why a contact problem was not solved: plain data, returned by contact solvers and carried by errors.
 
 use crate::error::few;
 use crate::real::Real;
 
-/// Why a contact problem was not solved; rows count within the problem.
+/// Why a contact problem was not solved; row numbers refer to the problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ContactFailure<T> {
-    /// No multipliers meet all conditions: rows demand opposite things of the same dofs.
+    /// No multipliers satisfy all conditions: rows contradict each other.
     Contradictory {
-        /// The row that is violated most.
+        /// The most violated row.
         row: usize,
-        /// The row that presses hardest against it.
+        /// The row that acts most against it.
         other: usize,
         /// The violation, in the unit of y.
         residual: T,
     },
     /// The iteration limit was reached.
     NotConverged {
-        /// Iterations spent.
+        /// Iterations performed.
         iterations: usize,
         /// The worst row.
         row: usize,
         /// Its residual, in the unit of y.
         residual: T,
     },
-    /// A contact for which friction leaves no way out (Painlevé): sliding on, every force that presses closes the gap
-    /// by more than it opens it, μ |W_nt| ≥ W_nn. It is proven that no multipliers solve the problem.
+    /// Friction jams a contact (Painlevé): while it slides, every pressing force closes the gap by at least as much
+    /// as it opens it, μ |W_nt| ≥ W_nn. It is proven that no multipliers solve the problem.
     Jammed {
         /// The first row of the contact.
         row: usize,
         /// μ.
         friction: f64,
-        /// W_nn: what a unit of the normal multiplier adds to the gap.
+        /// W_nn: change of the gap per unit of normal multiplier.
         normal: T,
-        /// W_nt: what a unit of friction adds to it, in the direction in which that is most.
+        /// W_nt: change of the gap per unit of friction, in the direction in which it is largest.
         coupling: T,
     },
-    /// The problem has a contact with friction, and the solver takes none; nothing was done.
+    /// The problem has a contact with friction, which the solver does not support; nothing was done.
     Friction {
         /// The first row of the contact.
         row: usize,
     },
-    /// W is not symmetric, and the solver is for symmetric ones; nothing was done.
+    /// W is not symmetric, which the solver requires; nothing was done.
     Unsymmetric {
-        /// The pair of rows whose entries across the diagonal differ most.
+        /// The row of the pair with the largest asymmetry.
         row: usize,
         /// The other row.
         other: usize,

@@ -1,6 +1,6 @@
-//! The name of a contact, which errors give and states keep.
+//! The identifier of a contact, used by errors and states.
 
-/// The stable name of a contact: what keeps multipliers and flags attached to it when candidates change.
+/// The stable identifier of a contact: it keeps multipliers and flags attached to it when candidates change.
 ///
 /// Feature and candidate are given by the constraint ([`Contacts::push`](crate::contact::Contacts::push)):
 ///
@@ -17,12 +17,12 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactId {
-    /// Index of the constraint in the simulation, in the order given: that of
+    /// Index of the constraint in the simulation, in the order given; see
     /// [`Simulation::constraint`](crate::Simulation::constraint).
     pub constraint: usize,
     /// Feature of the body (a node, a row), given by the constraint.
     pub feature: usize,
-    /// The candidate opposite of it, given by the constraint.
+    /// The candidate opposite the feature, given by the constraint.
     pub candidate: usize,
 }
 

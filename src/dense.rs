@@ -1,25 +1,25 @@
-//! Cholesky factorization of the small dense matrices of contact, semidefinite ones included: Delassus operators and
-//! S = G M⁻¹ Gᵀ. LU for Delassus operators that are not symmetric.
+//! Cholesky factorization of the small dense matrices of contact, including semidefinite ones: Delassus operators and
+//! S = G M⁻¹ Gᵀ. LU for unsymmetric Delassus operators.
 //!
-//! The size is the number of closed contacts. Rows that share no body leave zeros, and these are skipped, so that the
-//! diagonal S of a lumped mass costs next to nothing; large full matrices go to faer's blocked kernel. Redundant
-//! contacts make the matrix semidefinite: of all solutions the one of least norm is then returned.
+//! The size is the number of closed contacts. Rows that share no body give zeros, which are skipped, so the diagonal
+//! S of a lumped mass has almost no cost; large full matrices use faer's blocked kernel. Redundant contacts make the
+//! matrix semidefinite: the least-norm solution is then returned.
 
 use crate::memory::Scratch;
 use crate::real::{Kernels, Real};
 
-/// Lower factor L of a symmetric positive semidefinite matrix, or L U of any other, kept with its memory.
+/// Lower factor L of a symmetric positive semidefinite matrix, or L U of a general one, with its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DenseCholesky<T> {
     size: usize,
-    /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; of an LU both triangles
+    /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; for LU both triangles
     /// row by row.
     l: Vec<T>,
-    /// First nonzero column of each row of L (its skyline); of an LU the row that each pivot was exchanged with.
+    /// First nonzero column of each row of L (its skyline); for LU the row exchanged with each pivot.
     first: Vec<usize>,
     /// Diagonal of the matrix.
     diagonal: Vec<T>,
-    /// Rows that do not depend on those before them. The columns of L of the others are zero.
+    /// Rows that do not depend on earlier ones. The columns of L of dependent rows are zero.
     independent: Vec<usize>,
     kind: Kind,
     /// Factor of LᵀL on the independent columns, if there are dependent ones.
@@ -56,7 +56,7 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
-    /// Memory for [`factorize_general`](Self::factorize_general) of so many rows.
+    /// Memory for [`factorize_general`](Self::factorize_general) with this many rows.
     pub(crate) fn reserve_general(&mut self, size: usize) {
         let Self { l, first, diagonal, independent, .. } = self;
         l.reserve((size * size).saturating_sub(l.len()));
@@ -68,9 +68,9 @@ impl<T: Real> DenseCholesky<T> {
 
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
-    /// A pivot that keeps less than `size · 16 eps` of its diagonal entry belongs to a dependent row, and so does one
-    /// that is no more than the rounding of the combination of rows that it measures. `Err(row)` if the
-    /// matrix is not finite or not semidefinite there.
+    /// A row is dependent if its pivot is less than `size · 16 eps` of its diagonal entry, or at most the rounding of
+    /// the combination of rows that the pivot measures. `Err(row)` if the matrix is not finite or not semidefinite
+    /// there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let fill = |i: usize, row: &mut [T]| row.iter_mut().enumerate().for_each(|(j, x)| *x = entry(i, j));
         self.factorize_rows(size, fill)
@@ -111,7 +111,7 @@ impl<T: Real> DenseCholesky<T> {
                 independent.extend(0..size);
                 return Ok(());
             }
-            // Not sound: again row by row, from the start, because the kernel has overwritten both triangles.
+            // Failed: factorize again row by row from the start, because the kernel has overwritten both triangles.
             for i in 0..size {
                 fill(i, &mut l[i * size..=i * size + i]);
             }
@@ -129,8 +129,8 @@ impl<T: Real> DenseCholesky<T> {
                 };
             }
             let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
-            // A pivot above the rounding of its own diagonal entry may still be rounding: that of the rows before it,
-            // divided by the roots of their pivots.
+            // A pivot above the rounding of its own diagonal entry may still be rounding: that of earlier rows,
+            // amplified by their pivots.
             let sound = pivot > dependent * diagonal[i]
                 && (pivot > suspect * diagonal[i] || {
                     let length =
@@ -150,11 +150,11 @@ impl<T: Real> DenseCholesky<T> {
         Ok(())
     }
 
-    /// Factorizes a matrix that need not be symmetric, with entries `entry(i, j)` and a diagonal that is not negative,
-    /// by LU with partial pivoting. Rows and columns are measured by the roots of the diagonal.
+    /// Factorizes a general matrix with entries `entry(i, j)` and a nonnegative diagonal by LU with partial pivoting.
+    /// Rows and columns are scaled by the roots of the diagonal.
     ///
-    /// Where a pivot is lost in rounding the matrix is singular: the factorization ends there and cannot be used to
-    /// solve. `Err(row)` as from [`factorize`](Self::factorize).
+    /// If a pivot is lost in rounding, the matrix is singular: the factorization stops and cannot be used to solve.
+    /// `Err(row)` as from [`factorize`](Self::factorize).
     pub(crate) fn factorize_general(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let Self { l, first: exchanges, diagonal, independent, kind, .. } = self;
         (self.size, *kind) = (size, Kind::General);
@@ -171,12 +171,12 @@ impl<T: Real> DenseCholesky<T> {
             }
         }
         let dependent = T::of(16.0 * size as f64) * T::epsilon();
-        // `diagonal` is exchanged with the rows; the measure of a column is taken before that.
+        // `diagonal` is permuted with the rows; the scale of a column is computed before that.
         for k in 0..size {
             let measure = entry(k, k).sqrt();
             let share = |i: usize| l[i * size + k].abs() / diagonal[i];
             let pivot = (k + 1..size).fold(k, |best, i| if share(i) > share(best) { i } else { best });
-            // Written so that NaN, of a zero diagonal, is singular too.
+            // Written so that NaN, from a zero diagonal, counts as singular.
             let sound = share(pivot) > dependent * measure;
             if !sound {
                 return Ok(());
@@ -229,7 +229,7 @@ impl<T: Real> DenseCholesky<T> {
         normal.resize(rank * rank, T::zero());
         let mut count = 0;
         for k in 0..n {
-            // (Entries of L above the diagonal are leftovers.)
+            // Entries of L above the diagonal are not defined.
             count += usize::from(independent.get(count) == Some(&k));
             reduced.clear();
             reduced.extend(independent[..count].iter().map(|&i| l[k * n + i]));
@@ -304,9 +304,9 @@ impl<T: Real> DenseCholesky<T> {
     }
 }
 
-/// Length of the combination r of independent rows that is nearest to a row, from its entries of L: r = L⁻ᵀ l, measured
-/// as Σ |r_j| √A_jj. The pivot is what A leaves of the difference, and the rounding of A enters it times the square of
-/// its length.
+/// Length Σ |r_j| √A_jj of the combination r of independent rows that is nearest to a row, from the row's entries of
+/// L: r = L⁻ᵀ l. The pivot is the remainder of A for their difference, and the rounding of A enters it multiplied by
+/// the square of this length.
 fn combination<T: Real>(l: &[T], row: &[T], size: usize, independent: &[usize], diagonal: &[T], r: &mut Vec<T>) -> T {
     r.clear();
     r.extend(independent.iter().map(|&j| row[j]));
@@ -321,7 +321,7 @@ fn combination<T: Real>(l: &[T], row: &[T], size: usize, independent: &[usize], 
     r.iter().zip(independent).map(|(r, &j)| r.abs() * diagonal[j].sqrt()).sum()
 }
 
-/// Σ x y in four partial sums, which the processor can work on at once.
+/// Σ x y in four partial sums, which the processor can compute in parallel.
 pub(crate) fn dot<T: Real>(x: &[T], y: &[T]) -> T {
     let (mut sums, split) = ([T::zero(); 4], x.len() - x.len() % 4);
     for (x, y) in x[..split].chunks_exact(4).zip(y[..split].chunks_exact(4)) {

@@ -1,18 +1,18 @@
-//! The one error type of the crate: every variant carries the numbers and says what to mend.
+//! The error type of the crate: every variant carries its numbers and says what to do.
 
 mod check;
 
-/// The words for so many bytes.
+/// The text for a number of bytes.
 fn asked(bytes: Option<usize>) -> String {
     bytes.map_or_else(String::new, |bytes| format!(": {bytes} bytes were asked for"))
 }
 
-/// A number as messages print it: four significant digits.
+/// A number as printed in messages: four significant digits.
 pub(crate) fn few(x: f64) -> f64 {
     rounded(x, 3)
 }
 
-/// A time as messages print it: nine significant digits, which tell steps from each other.
+/// A time as printed in messages: nine significant digits, enough to distinguish steps.
 fn moment(t: f64) -> f64 {
     rounded(t, 8)
 }
@@ -21,7 +21,7 @@ fn rounded(x: f64, decimals: usize) -> f64 {
     format!("{x:.decimals$e}").parse().ok().filter(|rounded: &f64| rounded.is_finite()).unwrap_or(x)
 }
 
-/// What to do about a tangent that is indefinite in this iteration.
+/// The remedy for an indefinite tangent in this iteration.
 fn mend_tangent(iteration: usize) -> &'static str {
     match iteration {
         1 => {
@@ -39,12 +39,12 @@ pub(crate) use check::{positive, step_size};
 use crate::contact_failure::ContactFailure;
 use crate::contact_id::ContactId;
 
-/// What went wrong, where, and with which numbers.
+/// What failed, where, and with which numbers.
 ///
-/// Numbers are reported as `f64` whatever the scalar of the run; messages round them, the fields have all digits. The
-/// message of an error contains that of its cause, which [`source`](std::error::Error::source) does not return: each is
-/// printed once, by `{}` and by whoever prints the chain of sources. A step that fails leaves state and history bit for
-/// bit as they were.
+/// Numbers are reported as `f64` for any scalar of the run; messages round them, the fields have all digits. The
+/// message of an error contains the message of its cause, and [`source`](std::error::Error::source) does not return
+/// the cause again, so that printing the chain of sources repeats nothing. A failed step leaves state and history
+/// bitwise unchanged.
 ///
 #[doc = include_str!("../docs/errors.md")]
 #[derive(Debug, thiserror::Error)]
@@ -113,7 +113,7 @@ pub enum Error {
     /// A mass that must be positive is not.
     #[error("the mass of dof {dof} is {value:e}, it must be positive", value = few(*.value))]
     Mass {
-        /// The degree of freedom.
+        /// The dof.
         dof: usize,
         /// Its (diagonal) mass.
         value: f64,
@@ -121,7 +121,7 @@ pub enum Error {
     /// A degree of freedom does not exist in the system.
     #[error("{what} names dof {dof}, but the system has {dofs} dofs")]
     MissingDof {
-        /// Who names it.
+        /// The input that names it.
         what: &'static str,
         /// The dof named.
         dof: usize,
@@ -131,7 +131,7 @@ pub enum Error {
     /// A degree of freedom is named more than once where each must be named once.
     #[error("{what} names dof {dof} more than once; name each once")]
     RepeatedDof {
-        /// Who names it.
+        /// The input that names it.
         what: &'static str,
         /// The dof.
         dof: usize,
@@ -139,7 +139,7 @@ pub enum Error {
     /// A contact constraint names a degree of freedom that does not exist in the system.
     #[error("contact constraint {constraint} names dof {dof}, but the system has {dofs} dofs")]
     MissingContactDof {
-        /// The constraint, by its place in the order in which they were given.
+        /// The index of the constraint, in the order in which they were given.
         constraint: usize,
         /// The dof named.
         dof: usize,
@@ -149,7 +149,7 @@ pub enum Error {
     /// A contact constraint names a degree of freedom more than once.
     #[error("contact constraint {constraint} names dof {dof} more than once; `dofs` names each once")]
     RepeatedContactDof {
-        /// The constraint, by its place in the order in which they were given.
+        /// The index of the constraint, in the order in which they were given.
         constraint: usize,
         /// The dof.
         dof: usize,
@@ -175,7 +175,7 @@ pub enum Error {
     /// Something that must have content is empty.
     #[error("{what} is empty; {remedy}")]
     Empty {
-        /// What is empty.
+        /// The empty input.
         what: &'static str,
         /// What to do.
         remedy: &'static str,
@@ -183,15 +183,15 @@ pub enum Error {
     /// Two parts do not fit together.
     #[error("{part} cannot be used here: {reason}")]
     Incompatible {
-        /// The part that was refused.
+        /// The rejected part.
         part: String,
         /// Why.
         reason: &'static str,
     },
-    /// A facet of a contact surface has no front, or shows its back where its neighbors show their front.
+    /// A facet of a contact surface has no front side, or its orientation is opposite to its neighbors'.
     #[error("facet {facet} of a contact surface (nodes {nodes:?}) is inverted: {reason}")]
     InvertedFacet {
-        /// Its index in the list of the surface.
+        /// Its index in the list of facets.
         facet: usize,
         /// Its nodes.
         nodes: Vec<usize>,
@@ -208,7 +208,7 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
-    /// A time-integration tableau does not converge to the motion, however small the step: its order is 0.
+    /// A time-integration tableau does not converge to the motion for any step size: its order is 0.
     #[error(
         "{integrator} is of order 0 in displacement or velocity: its results are no motion of the system, however \
          small the step; check the rows of its tableau with `analysis::order`"
@@ -217,7 +217,7 @@ pub enum Error {
         /// Name of the integrator.
         integrator: String,
     },
-    /// A time-integration tableau is zero-unstable: errors of single steps grow without bound, however small the step.
+    /// A time-integration tableau is zero-unstable: errors of single steps grow without bound for any step size.
     #[error(
         "{integrator} (order {order}) is zero-unstable: without stiffness and damping a step has the spectral radius \
          {radius:e}, or more than the double root 1 of rigid motion; check the rows of its tableau with \
@@ -232,7 +232,7 @@ pub enum Error {
         /// Spectral radius of a step at frequency zero.
         radius: f64,
     },
-    /// A step beyond the stability limit of the scheme.
+    /// The step size is beyond the stability limit of the scheme.
     #[error(
         "h = {h:e} is beyond the stability limit of {integrator}: the highest frequency of the system, or the rate of \
          its strongest damping, is {frequency:e} (1/time) or more, for which h may be {largest:e}; take smaller steps \
@@ -246,12 +246,12 @@ pub enum Error {
         h: f64,
         /// The largest step size that is stable.
         largest: f64,
-        /// The highest circular frequency of M⁻¹ K that was found; or the highest rate of M⁻¹ C, if that is more and
-        /// the scheme takes damping forces from before the step.
+        /// The highest circular frequency of M⁻¹ K found, or the highest rate of M⁻¹ C if that is larger and the
+        /// scheme evaluates damping forces before the step.
         frequency: f64,
     },
-    /// A step has become too long: a compliant contact that presses, or a system that stiffens, has a frequency beyond
-    /// the stability limit of the scheme.
+    /// The step size has become too long: the frequency of a pressed compliant contact, or of a stiffening system,
+    /// exceeds the stability limit of the scheme.
     #[error(
         "step from t = {t:e} with h = {h:e}: {} than {integrator} takes: the highest frequency is now {frequency:e} \
          (1/time) or more, and h may be about {largest:e}; take smaller steps (`StepControl` does), a softer contact \
@@ -266,11 +266,11 @@ pub enum Error {
         t: f64,
         /// Step size.
         h: f64,
-        /// The stiffest contact; none where the system itself has stiffened.
+        /// The stiffest contact; `None` if the system itself has stiffened.
         contact: Option<ContactId>,
         /// An estimate of the largest step size that is stable.
         largest: f64,
-        /// The highest circular frequency that was found, of M⁻¹ (K + Gᵀ k G).
+        /// The highest circular frequency found, of M⁻¹ (K + Gᵀ k G).
         frequency: f64,
     },
     /// A matrix that must be positive definite is not.
@@ -284,7 +284,7 @@ pub enum Error {
         /// Degree of freedom of the failing pivot.
         dof: usize,
     },
-    /// An iteration has met a direction along which a matrix that must be positive definite is not.
+    /// An iteration has found a direction along which a matrix that must be positive definite is not.
     #[error(
         "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of \
          conjugate gradients, least of all at dof {dof}; look for a body without mass or support, or a negative \
@@ -304,16 +304,16 @@ pub enum Error {
         residual = few(*.residual), tolerance = few(*.tolerance)
     )]
     LinearNotConverged {
-        /// The iteration.
+        /// Name of the iterative method.
         method: &'static str,
-        /// Iterations spent.
+        /// Iterations performed.
         iterations: usize,
-        /// The residual reached, over the right-hand side.
+        /// The residual reached, relative to the right-hand side.
         residual: f64,
-        /// What it must be.
+        /// The required residual.
         tolerance: f64,
     },
-    /// A mode does not fulfill K φ = ω² M φ, or is not orthonormal to the others.
+    /// A mode does not satisfy K φ = ω² M φ, or is not orthonormal to the others.
     #[error(
         "mode {mode} leaves a residual of {residual:e}, tolerance {tolerance:e}; of given modes look at their order of \
          dofs, their units and their normalization (φᵀMφ = 1), of computed ones at masses or stiffnesses that differ \
@@ -323,12 +323,12 @@ pub enum Error {
     ModeResidual {
         /// The mode, counted from 0.
         mode: usize,
-        /// What it leaves, relative to itself.
+        /// Its residual, relative to the mode.
         residual: f64,
-        /// What it may leave.
+        /// The allowed residual.
         tolerance: f64,
     },
-    /// Not all modes below a frequency are there.
+    /// Some modes below a frequency are missing.
     #[error(
         "{found} modes below the circular frequency {frequency:e} (1/time) where the inertia of K − ω²M counts \
          {expected}; give those that are missing, and rigid motions too",
@@ -337,7 +337,7 @@ pub enum Error {
     ModesMissed {
         /// Modes found or given.
         found: usize,
-        /// Modes that there are.
+        /// Number of modes that exist.
         expected: usize,
         /// The frequency.
         frequency: f64,
@@ -347,8 +347,7 @@ pub enum Error {
     OutOfMemory {
         /// What was to be allocated.
         what: &'static str,
-        /// How much was asked for; none where that is known to the linear algebra library alone, or is more than can be
-        /// addressed.
+        /// Requested size; `None` if only the linear algebra library knows it, or if it exceeds the address space.
         bytes: Option<usize>,
     },
     /// A contact row has no effect on any free degree of freedom.
@@ -357,7 +356,7 @@ pub enum Error {
         /// The contact.
         contact: ContactId,
     },
-    /// A contact row acts where its constraint has no dof that it may act on.
+    /// A contact row refers to a place that is not among the dofs on which its constraint may act.
     #[error(
         "contact {contact} acts on place {place} of its constraint's dofs, but `dofs` lists no such place, or \
          `only_reads` says that no row acts there; rows name places in `dofs`, not dofs of the system"
@@ -368,7 +367,7 @@ pub enum Error {
         /// The place.
         place: usize,
     },
-    /// Closed contacts demand opposite things: no contact forces meet them all.
+    /// Closed contacts contradict each other: no contact forces satisfy all of them.
     #[error(
         "t = {t:e}: contacts {contact} and {other} contradict each other, {contact} stays violated by {violation:e} \
          (gap units) whatever the forces; a body is squeezed between obstacles or tied twice",
@@ -379,15 +378,15 @@ pub enum Error {
         t: f64,
         /// The contact that is violated most.
         contact: ContactId,
-        /// The contact that presses hardest against it.
+        /// The contact that acts most against it.
         other: ContactId,
         /// The violation, in units of the gap.
         violation: f64,
     },
-    /// Friction jams a contact: as it slides on, no force of it can stop the approach (Painlevé), since
-    /// μ |W_nt| ≥ W_nn. At the start of a run an impact stops the slip of one such contact instead
+    /// Friction jams a contact (Painlevé): while it slides, no contact force can stop the approach, since μ |W_nt| ≥
+    /// W_nn. At the start of a run an impact stops the slip of one such contact instead
     /// ([`StartAdjustment::impact`](crate::StartAdjustment)). Steps, restarts, and starts with several such contacts
-    /// return this error. A model that resolves what happens then has compliance.
+    /// return this error. Only a model with compliance resolves the motion after that.
     #[error(
         "t = {t:e}: contact {contact} jams: with μ = {friction} a unit of its force closes the gap by {friction} × \
          {coupling:e} through friction and opens it by {normal:e} only; lower μ, or give the contact compliance \
@@ -401,13 +400,13 @@ pub enum Error {
         contact: ContactId,
         /// μ.
         friction: f64,
-        /// W_nn: what a unit of the normal multiplier adds to the gap.
+        /// W_nn: change of the gap per unit of normal multiplier.
         normal: f64,
-        /// W_nt: what a unit of friction adds to it, in the direction in which that is most.
+        /// W_nt: change of the gap per unit of friction, in the direction in which it is largest.
         coupling: f64,
     },
-    /// Contacts answer to each other differently, because the effective matrix is not symmetric, and the contact solver
-    /// is for symmetric problems.
+    /// The effective matrix is not symmetric, so contacts respond unequally to each other, and the contact solver
+    /// requires symmetric problems.
     #[error(
         "t = {t:e}: contact {contact} answers to {other} otherwise than {other} to {contact}: the effective matrix is \
          not symmetric; solve contact by ActiveSet or GaussSeidel",
@@ -416,7 +415,7 @@ pub enum Error {
     UnsymmetricContacts {
         /// Time of the stage.
         t: f64,
-        /// The pair that differs most.
+        /// The contact of the pair with the largest asymmetry.
         contact: ContactId,
         /// The other contact of the pair.
         other: ContactId,
@@ -430,14 +429,14 @@ pub enum Error {
     Contact {
         /// Time of the stage.
         t: f64,
-        /// Iterations spent.
+        /// Iterations performed.
         iterations: usize,
         /// Worst contact.
         contact: ContactId,
         /// Its complementarity residual, in units of the gap.
         residual: f64,
     },
-    /// The rows of contact, linearized at the result of the problem that was solved with them, did not settle.
+    /// The repeated linearization of the contact rows did not converge.
     #[error(
         "t = {t:e}: contact not settled after {iterations} linearizations: {what} of contact {contact} still changes \
          by {change:e} (relative), tolerance {tolerance:e}; take smaller steps (`StepControl` does)",
@@ -446,18 +445,18 @@ pub enum Error {
     ContactUnsettled {
         /// Time of the stage.
         t: f64,
-        /// Linearizations, after each of which the problem was solved.
+        /// Number of linearizations; the problem was solved after each.
         iterations: usize,
-        /// The contact that changes most.
+        /// The contact with the largest change.
         contact: ContactId,
-        /// What of it: gap, slip, force or displacement.
+        /// The changing quantity: gap, slip, force or displacement.
         what: &'static str,
-        /// Its change from one linearization to the next, relative to what contact has changed it by.
+        /// Its change between the last two linearizations, relative to its total change by contact.
         change: f64,
         /// The change that would have been accepted.
         tolerance: f64,
     },
-    /// A gap moves in time by itself, and its rates do not say so.
+    /// A gap changes in time by itself, but its constraint reports no rates.
     #[error(
         "contact {contact}: with displacements held its gap goes from {:e} to {:e} between t = {:e} and {:e}, but its \
          rates are zero; give ∂g/∂t (`ContactConstraint::rates`, or the second entry of a moving offset or gap \
@@ -467,12 +466,13 @@ pub enum Error {
     SilentMotion {
         /// The contact.
         contact: ContactId,
-        /// Between which times.
+        /// The two times.
         t: [f64; 2],
-        /// The gap at both.
+        /// The gap at both times.
         gap: [f64; 2],
     },
-    /// The row of a contact is not the derivative of its gap, and its constraint says that rows do not change.
+    /// The row of a contact is not the derivative of its gap, although its constraint reports that rows do not
+    /// change.
     #[error(
         "contact {contact}: between t = {:e} and {:e} displacements change its gap by {:e}, along its row of G by {:e}, \
          and its constraint says that rows do not change; return `Candidates::Changed` from `search` and `follow` when \
@@ -484,7 +484,7 @@ pub enum Error {
         contact: ContactId,
         /// The step.
         t: [f64; 2],
-        /// The change of its gap in the step, with obstacles held, and that along its row.
+        /// The change of its gap in the step with obstacles held, and the change along its row.
         change: [f64; 2],
     },
     /// The contact problem of a frame between two bodies was not solved.
@@ -544,11 +544,11 @@ pub enum Error {
         t: f64,
         /// Step size.
         h: f64,
-        /// Iterations spent.
+        /// Iterations performed.
         iterations: usize,
-        /// Residual over the forces.
+        /// Residual relative to the forces.
         residual: f64,
-        /// Last increment over the whole one.
+        /// Last increment relative to the total increment.
         increment: f64,
         /// The dof with the largest residual.
         dof: usize,
@@ -567,14 +567,14 @@ pub enum Error {
         /// Distance from t to the next time that can be represented.
         resolution: f64,
     },
-    /// A step was refused at its size and at halves of it, down to the smallest allowed.
+    /// A step was rejected at its size and at repeated halves of it, down to the smallest allowed.
     #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}", t = moment(*.t), h = few(*.h))]
     StepRefused {
         /// Time at the start of the step.
         t: f64,
         /// The last step size tried.
         h: f64,
-        /// Attempts.
+        /// Number of attempts.
         attempts: u32,
         /// Why the last attempt failed.
         r#source: Box<Error>,
@@ -628,7 +628,7 @@ pub enum Error {
         /// The value (displacement, velocity or acceleration).
         value: f64,
     },
-    /// A node has left the facets that the last search found for it.
+    /// A node has left the facets found for it by the last search.
     #[error(
         "t = {t:e}: contact {contact} has left what the search at the start of the step found; take smaller steps or \
          give the contact a larger reach",
@@ -640,7 +640,7 @@ pub enum Error {
         /// The contact.
         contact: ContactId,
     },
-    /// A body has passed through another one within a step, or was stopped where that one is not.
+    /// A body has passed through another one within a step, or was stopped where the other body is not.
     #[error(
         "step from t = {t:e} with h = {h:e}: contact {contact} {what}; its node, at a gap of {gap:e}, went {way:e} \
          against the surface; take smaller steps (`StepControl` does)",
@@ -653,11 +653,11 @@ pub enum Error {
         h: f64,
         /// The contact.
         contact: ContactId,
-        /// What has happened, in words.
+        /// What happened.
         what: &'static str,
-        /// The way of the node against the surface (length).
+        /// The displacement of the node against the surface (length).
         way: f64,
-        /// Its gap where the step starts (length).
+        /// Its gap at the start of the step (length).
         gap: f64,
     },
     /// The host cannot evaluate a trial state; a smaller step may help.
@@ -665,30 +665,31 @@ pub enum Error {
     Inadmissible {
         /// Which callback.
         callback: &'static str,
-        /// The host's own error; from a step, one that says t and h as well, and has the host's own as its source.
+        /// The host's own error. If a step failed, the error that adds t and h, with the host's own error as its
+        /// source.
         r#source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// A step, or another call of all ranks, has failed on another rank and therefore on this one.
+    /// A step, or another collective call, has failed on another rank and therefore on this one.
     #[error("rank {rank} has failed: {message}")]
     OtherRank {
         /// Number of the rank (the first of those that failed).
         rank: usize,
         /// Whether a smaller step may help.
         recoverable: bool,
-        /// Its error in words, cut where it is long.
+        /// The message of its error, truncated if long.
         message: String,
     },
-    /// Something that must be the same on all ranks is not.
+    /// A value that must be the same on all ranks differs.
     #[error("ranks differ: {what} lies between {smallest:e} and {largest:e}")]
     RanksDiffer {
-        /// What they have to agree on.
+        /// The value that must agree.
         what: &'static str,
         /// The smallest value found.
         smallest: f64,
-        /// The largest, or the value that it must have.
+        /// The largest value found, or the required value.
         largest: f64,
     },
-    /// A callback of the host has panicked in an earlier call, and the host's own parts may have stopped half way.
+    /// A callback of the host panicked in an earlier call and may have left the host's own data incomplete.
     #[error(
         "a callback of the host has panicked in an earlier call: this simulation does not go on; its state and \
          history are those before that call: build another one and `resume` from them, or from copies kept before"
@@ -707,7 +708,7 @@ pub enum Error {
 /// Result with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What a host says of a state, with the step that it belongs to.
+/// The host's error for a state, with the step that it belongs to.
 #[derive(Debug, thiserror::Error)]
 #[error("step from t = {t:e} with h = {h:e}: {source}", t = moment(*.t), h = few(*.h))]
 struct InStep {
@@ -717,7 +718,7 @@ struct InStep {
 }
 
 impl Error {
-    /// Adds the step to what a host says of one of its states.
+    /// Adds the step to the host's error for one of its states.
     pub(crate) fn in_step(self, t: f64, h: f64) -> Self {
         match self {
             Self::Inadmissible { callback, source } => {
@@ -729,7 +730,7 @@ impl Error {
 
     /// Whether a smaller step may help (a failed step, not a wrong input).
     ///
-    /// [`Host`](Self::Host) never is: a host whose callback may succeed with a smaller step says
+    /// [`Host`](Self::Host) is never recoverable: a host whose callback may succeed with a smaller step returns
     /// [`Inadmissible`](Self::Inadmissible).
     pub fn is_recoverable(&self) -> bool {
         matches!(

@@ -1,4 +1,4 @@
-//! The state of a run: its motion, as later steps and as users read it, and its contacts.
+//! The state of a run: its motion, as stored for later steps and as shown to users, and its contacts.
 
 mod backup;
 #[cfg(feature = "serde")]
@@ -40,7 +40,7 @@ impl<T: Real> Motion<T> {
         Self { t: 0.0, u: zero(), v: zero(), a: zero() }
     }
 
-    /// Time, and u, v, a there: what gaps and their rates are evaluated at.
+    /// Time, and u, v, a at that time, for evaluating gaps and their rates.
     pub(crate) fn place(&self) -> (f64, [&[T]; 3]) {
         (self.t, [&self.u, &self.v, &self.a])
     }
@@ -53,7 +53,7 @@ impl<T: Real> Motion<T> {
         self.a.copy_from_slice(&other.a);
     }
 
-    /// Field 1, 2: v, a, to be edited.
+    /// Mutable field 1 or 2: v or a.
     pub(crate) fn rate_mut(&mut self, field: usize) -> &mut Vec<T> {
         match field {
             1 => &mut self.v,
@@ -61,7 +61,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// Field 1, 2: v, a at the time of the state: `shown`, unless it is empty because the stored ones live there.
+    /// Field 1 or 2 (v or a) at the time of the state: `shown`, or the stored values if `shown` is empty.
     pub(crate) fn shown<'v>(&'v self, shown: &'v [Vec<T>; 2], field: usize) -> &'v [T] {
         match shown[field - 1].is_empty() {
             true => self.field(field),
@@ -81,16 +81,16 @@ impl<T: Real> Motion<T> {
 
 /// The state of a simulation at a time: motion and contacts.
 ///
-/// Together with [`History`] it is everything a later step reads: continue from clones of both and the run goes on bit
-/// for bit.
+/// State and [`History`] together are all that later steps read: a run continued from clones of both is bitwise the
+/// same.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<T> {
     /// Values as the scheme stores them.
     pub(crate) motion: Motion<T>,
-    /// Velocity and acceleration at the time of the state; empty where the stored ones live there.
+    /// Velocity and acceleration at the time of the state; empty if the stored ones have that time.
     pub(crate) shown: [Vec<T>; 2],
     pub(crate) contacts: ContactState<T>,
-    /// In the order in which they broke.
+    /// Broken bonds in the order in which they broke.
     pub(crate) broken: Vec<BrokenBond>,
 }
 
@@ -100,51 +100,51 @@ impl<T: Real> State<T> {
         self.motion.t
     }
 
-    /// Displacements, one a dof.
+    /// Displacements, one per dof.
     pub fn displacement(&self) -> &[T] {
         &self.motion.u
     }
 
-    /// Velocities at the time of the state, one a dof.
+    /// Velocities at the time of the state, one per dof.
     pub fn velocity(&self) -> &[T] {
         self.motion.shown(&self.shown, 1)
     }
 
-    /// Accelerations at the time of the state, one a dof.
+    /// Accelerations at the time of the state, one per dof.
     ///
-    /// Some schemes store v or a of another time ([`Order`](crate::analysis::Order) says which). The values here are
-    /// extrapolated from two states, or those of the scheme where a contact closed or opened between the two (by more
-    /// than rounding).
+    /// Some schemes store v or a at another time, given by [`Order`](crate::analysis::Order). The values here are
+    /// extrapolated from two states, or are the stored ones if a contact closed or opened between the two by more
+    /// than rounding.
     pub fn acceleration(&self) -> &[T] {
         self.motion.shown(&self.shown, 2)
     }
 
-    /// Velocities as the scheme stores them, at the time that its rows give them.
+    /// Velocities as the scheme stores them, at the time defined by its rows.
     pub fn stored_velocity(&self) -> &[T] {
         &self.motion.v
     }
 
-    /// Accelerations as the scheme stores them, at the time that its rows give them: what its balance holds for.
+    /// Accelerations as the scheme stores them, at the time defined by its rows; they satisfy its balance.
     pub fn stored_acceleration(&self) -> &[T] {
         &self.motion.a
     }
 
-    /// Contacts, one entry a candidate.
+    /// Contacts, one entry per candidate.
     pub fn contacts(&self) -> &ContactState<T> {
         &self.contacts
     }
 
-    /// The bonds that have broken since the start, in the order in which they did.
+    /// The bonds that have broken since the start, in order.
     pub fn broken_bonds(&self) -> &[BrokenBond] {
         &self.broken
     }
 
-    /// Those of them that the last step has broken.
+    /// The bonds broken in the last step.
     pub fn newly_broken_bonds(&self) -> &[BrokenBond] {
         self.broken_at(self.time())
     }
 
-    /// Those that the last step has broken that ended at t.
+    /// The bonds broken in the last step, which ended at t.
     pub(crate) fn broken_at(&self, t: f64) -> &[BrokenBond] {
         let count = self.broken.iter().rev().take_while(|bond| bond.time.to_bits() == t.to_bits()).count();
         &self.broken[self.broken.len() - count..]

@@ -1,9 +1,9 @@
-//! Numbers of the host that make no sense are refused.
+//! Checks of numbers given by the host.
 
 use super::{Error, Result};
 use crate::real::Real;
 
-/// Refuses lengths, times, stiffnesses and the like that are not positive and finite.
+/// Rejects lengths, times, stiffnesses and the like that are not positive and finite.
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
     match value > 0.0 && value.is_finite() {
         true => Ok(value),
@@ -11,8 +11,8 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
     }
 }
 
-/// Refuses step sizes that are not positive and finite, and those whose square or its reciprocal the scalar cannot
-/// hold.
+/// Rejects step sizes that are not positive and finite, or whose square or its reciprocal the scalar cannot
+/// represent.
 pub(crate) fn step_size<T: Real>(h: f64) -> Result<()> {
     let fits = |x: f64| T::of(x).is_normal();
     match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {

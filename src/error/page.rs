@@ -1,10 +1,11 @@
-//! `docs/errors.md` has every variant: with an input that provokes it, what to do, and what it means to a host.
+//! Checks that `docs/errors.md` covers every variant: an input that provokes it, the remedy, and its meaning for a
+//! host.
 
 const PAGE: &str = include_str!("../../docs/errors.md");
 const ERRORS: &str = include_str!("../error.rs");
 const FAILURES: &str = include_str!("../contact_failure.rs");
 
-/// The variants of an enum, as its source has them.
+/// The variants of an enum, read from its source.
 fn variants(source: &str, name: &str) -> Vec<String> {
     let body = source.split(name).nth(1).and_then(|rest| rest.split("\n}").next()).unwrap();
     let names = body.lines().filter_map(|line| line.strip_prefix("    "));
@@ -12,7 +13,7 @@ fn variants(source: &str, name: &str) -> Vec<String> {
     names.map(|line| line.trim_end_matches(|end: char| !end.is_alphanumeric()).to_owned()).collect()
 }
 
-/// What a line of the page has in `code`.
+/// The text in backquotes in a line of the page.
 fn code(line: &str) -> Vec<&str> {
     line.split('`').skip(1).step_by(2).collect()
 }
@@ -22,7 +23,7 @@ fn rows() -> impl Iterator<Item = Vec<&'static str>> {
     PAGE.lines().filter(|line| line.starts_with("| ")).map(|line| line.trim_matches('|').split(" | ").collect())
 }
 
-/// The program of the page that names a variant in a pattern.
+/// Whether a program of the page names a variant in a pattern.
 fn is_provoked(pattern: &str) -> bool {
     PAGE.lines().any(|line| line.contains("matches!") && line.contains(pattern))
 }
@@ -42,7 +43,7 @@ fn every_variant_is_provoked_and_has_a_remedy() {
     }
 }
 
-/// The table for hosts names each variant once, and in its first row what `is_recoverable` says.
+/// The table for hosts names each variant once, and its first row has the recoverable ones.
 #[test]
 fn hosts_are_told_what_each_variant_means() {
     let hosts: Vec<_> = rows().filter(|cells| cells.len() == 3 && cells[1].contains('`')).collect();

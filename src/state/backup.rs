@@ -1,34 +1,34 @@
-//! What undoes a failed step: its rotations of the history, and a copy of the past made at the first edit.
+//! Undoes a failed step: its rotations of the history, and its edits, from a copy of the past made at the first edit.
 
 use super::Motion;
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// The past as it was before the step, kept when a corrector first edits it.
+/// The past before the step, copied when a corrector first edits it.
 #[derive(Debug)]
 pub(crate) struct Backup<T> {
-    /// Whether a step has begun and not ended: state and history are then those of its present stage.
+    /// Whether a step has begun and not ended: state and history then belong to its present stage.
     pub(crate) underway: bool,
-    /// How often the step has rotated the history: once a stage.
+    /// Number of times the step has rotated the history, once per stage.
     pub(crate) rotations: usize,
-    /// What `rotations` was when the copy was made, if there is one.
+    /// The value of `rotations` when the copy was made, if there is one.
     kept: Option<usize>,
     /// The copy; no slots if no corrector edits the past.
     slots: Vec<Motion<T>>,
 }
 
 impl<T: Real> Backup<T> {
-    /// Room for `slots` past states.
+    /// Memory for `slots` past states.
     pub(crate) fn new(slots: usize, dofs: usize) -> Self {
         Self { underway: false, rotations: 0, kept: None, slots: vec![Motion::zero(dofs); slots] }
     }
 
-    /// Forgets the copy: the step begins.
+    /// Discards the copy at the beginning of a step.
     pub(crate) fn begin(&mut self) {
         (self.rotations, self.kept) = (0, None);
     }
 
-    /// Refuses edits that could not be undone.
+    /// Rejects edits that could not be undone.
     pub(crate) fn check(&self) -> Result<()> {
         match self.slots.is_empty() {
             false => Ok(()),
@@ -39,7 +39,7 @@ impl<T: Real> Backup<T> {
         }
     }
 
-    /// The motion that the step started from, before any edit of it; `past` is as the stages have rotated it.
+    /// The motion at the start of the step, before any edit; `past` is rotated by the stages.
     pub(crate) fn start<'p>(&'p self, past: &'p [Motion<T>]) -> &'p Motion<T> {
         let copy = self.kept.and_then(|rotations| self.slots.get(rotations.checked_sub(1)?));
         copy.unwrap_or(&past[self.rotations - 1])
@@ -53,7 +53,7 @@ impl<T: Real> Backup<T> {
         }
     }
 
-    /// Makes the copy, if the step has none yet.
+    /// Makes the copy if the step has none yet.
     pub(crate) fn keep(&mut self, past: &[Motion<T>]) {
         if self.kept.is_none() {
             for (copy, original) in self.slots.iter_mut().zip(past) {

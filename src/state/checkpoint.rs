@@ -1,4 +1,4 @@
-//! A run at an instant as one value, to be written to a file and read again.
+//! A run at one instant as one value, for saving and restoring.
 
 use super::State;
 use super::history::History;
@@ -7,12 +7,12 @@ use crate::real::Real;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// State and history of a run at one instant: all that its later steps read, to be saved by any format of serde. With
-/// the feature `serde`.
+/// State and history of a run at one instant: all data that its later steps read, for saving in any format of serde.
+/// Requires the feature `serde`.
 ///
-/// Made by [`Simulation::checkpoint`](crate::Simulation::checkpoint), taken by
-/// [`SimulationBuilder::resume_from`](crate::SimulationBuilder::resume_from): the run goes on bit for bit, if the
-/// format keeps the bits of numbers. Binary ones do; `serde_json` does with its feature `float_roundtrip`.
+/// Created by [`Simulation::checkpoint`](crate::Simulation::checkpoint) and used by
+/// [`SimulationBuilder::resume_from`](crate::SimulationBuilder::resume_from). The resumed run is bitwise the same if
+/// the format preserves the bits of numbers. Binary formats do; `serde_json` does with its feature `float_roundtrip`.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -41,24 +41,25 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 ///
 /// # What is in it, and what is not
 ///
-/// A file names its format (a number), the scalar (`f32` or `f64`) and the scheme, with a number that tells the rows of
-/// schemes apart. The format changes when what is stored changes, and files of another one are refused; results, and
-/// with them the bits of a run, may change between versions of the crate without that. Stored are the vectors of the
-/// state and of the past that is read, the contacts, the clock, the place of a controlled step size in the nominal
-/// grid, and the depths of overlaps at the start.
+/// A file contains its format number, the scalar (`f32` or `f64`), the name of the scheme and a fingerprint of its
+/// rows. The format number changes whenever the stored data change, and files of another format are rejected.
+/// Results, and so the bits of a run, may change between versions of the crate without a new format number. Stored
+/// are the vectors of the state and of the past states that are read, the contacts, the clock, the position of a
+/// controlled step size in the nominal grid, and the overlap depths at the start.
 ///
-/// Not in it are system, constraints, correctors and settings: the host builds these again as they were. A history of
-/// the host's own (plastic strains, as [`System::commit`](crate::System::commit) moves them) is the host's to save.
-/// [`Statistics`](crate::Statistics) and the [`Works`](crate::Works) of the energy balance count from the build of a
-/// simulation; both can be saved, and added to those of the run that goes on.
+/// Not stored are system, constraints, correctors and settings: the host must build them again as before. The host
+/// must save history variables of its own, such as plastic strains changed in
+/// [`System::commit`](crate::System::commit). [`Statistics`](crate::Statistics) and the [`Works`](crate::Works) of
+/// the energy balance count from the build of a simulation; both can be saved and added to the values of the resumed
+/// run.
 ///
 /// # Errors
 ///
-/// Reading refuses, in the format's own error, files of something else, of another format or scalar, and what no run
-/// leaves: numbers that are not finite, lists of different lengths, counts out of range. What depends on the
-/// simulation is checked by [`build`](crate::SimulationBuilder::build): number of dofs, scheme, step size, and that the
-/// state is that of the end of its history. A file with wrong but possible numbers is taken as it is: checksums are the
-/// host's.
+/// Reading fails, with the format's own error, for other files, another format or scalar, and data that no run
+/// produces: numbers that are not finite, lists of different lengths, counts out of range.
+/// [`build`](crate::SimulationBuilder::build) checks what depends on the simulation: number of dofs, scheme, step
+/// size, and that the state matches the end of its history. Wrong but possible numbers are not detected: use
+/// checksums.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<T> {
     pub(crate) state: State<T>,
@@ -79,7 +80,7 @@ impl<T: Real> Checkpoint<T> {
         &self.history
     }
 
-    /// Name of the scheme that made it.
+    /// Name of the scheme that created it.
     pub fn scheme(&self) -> &str {
         &self.history.scheme
     }

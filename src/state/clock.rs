@@ -1,19 +1,19 @@
-//! Time, and where a step size that changes stands in the grid of its nominal one.
+//! Time, and the position of a changing step size in the grid of the nominal one.
 
 #[cfg(feature = "serde")]
 use super::read::{COUNT, count, number};
 use crate::error::{Error, Result};
 
-/// Time as origin + elapsed + k h, so that it does not drift. What has elapsed is a sum of spacings, which the origin
-/// does not round: runs are the same whenever they start.
+/// Time as origin + elapsed + k h, so that it does not drift. The elapsed time is a sum of step sizes that is not
+/// rounded by the origin: runs are the same for any start time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Clock {
     /// Time at the start of the run.
     origin: f64,
-    /// From there to the last change of the step size.
+    /// Time from the start to the last change of the step size.
     elapsed: f64,
-    /// Steps since then, and their size.
+    /// Steps since that change, and their size.
     pub(crate) steps: u64,
     pub(crate) h: f64,
 }
@@ -23,7 +23,7 @@ impl Clock {
         Self { origin, elapsed: 0.0, steps: 0, h }
     }
 
-    /// Time at `fraction` of the step that comes next.
+    /// Time at `fraction` of the next step.
     pub(crate) fn at(&self, fraction: f64) -> f64 {
         self.origin + self.elapsed_at(fraction)
     }
@@ -37,7 +37,7 @@ impl Clock {
         Self { elapsed: self.elapsed_at(0.0), steps: 0, h, ..*self }
     }
 
-    /// From now until t.
+    /// Duration from now until t.
     pub(crate) fn until(&self, t: f64) -> f64 {
         (t - self.origin) - self.elapsed_at(0.0)
     }
@@ -47,8 +47,7 @@ impl Clock {
         t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
     }
 
-    /// Refuses a step size that does not change the time: host functions of time would stand still while the motion
-    /// goes on.
+    /// Rejects a step size that does not change the time: host functions of time would not advance with the motion.
     pub(crate) fn check(&self) -> Result<()> {
         let (t, h) = (self.at(0.0), self.h);
         match h >= resolution(t) {
@@ -58,10 +57,10 @@ impl Clock {
     }
 }
 
-/// Of a checkpoint that was read.
+/// Checks of a clock read from a checkpoint.
 #[cfg(feature = "serde")]
 impl Clock {
-    /// Refuses what no run leaves.
+    /// Rejects values that no run produces.
     pub(super) fn check_read(&self) -> Result<()> {
         let Self { origin, elapsed, steps, h } = *self;
         number("the start time of a checkpoint", origin, "finite", f64::is_finite)?;
@@ -77,41 +76,41 @@ pub(crate) fn resolution(t: f64) -> f64 {
     t.abs().next_up() - t.abs()
 }
 
-/// Where the present step size stands in the nominal grid, for runs that control it.
+/// Position of the present step size in the nominal grid, for runs that control it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pace {
-    /// The step size given, of which all others are halves, quarters and so on.
+    /// The given step size; all others are this size halved repeatedly.
     pub(crate) nominal: f64,
-    /// How often the nominal step is halved now.
+    /// Present number of halvings.
     level: u32,
-    /// Steps of the present size since the size last was the nominal one.
+    /// Steps of the present size since the size was last the nominal one.
     position: u64,
-    /// Steps taken since the size last changed, and whether it grew then.
+    /// Steps taken since the size last changed, and whether that change was growth.
     steps: u32,
     grown: bool,
-    /// Steps that growth asks for.
+    /// Steps required before growth.
     patience: u32,
-    /// Halvings that growth keeps: a larger step was beyond the limit of stability of the system, and of contacts that
-    /// pressed (until none does).
+    /// Least number of halvings, because a larger step was beyond the stability limit of the system, or of pressed
+    /// contacts (until none presses).
     kept: [u32; 2],
-    /// Time over which the error of a velocity lasts: about the time between changes of contact. It grows in each step,
-    /// and halves in a step in which a contact closes, opens, begins or ends to slide, or its slip reverses.
+    /// Time for which a velocity error persists: about the time between changes of contact. It grows in each step and
+    /// halves in a step in which a contact closes, opens, starts or stops sliding, or reverses its slip.
     pub(crate) lasting: f64,
 }
 
-/// Why a step was refused.
+/// Why a step was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// For something that passes.
+    /// A temporary cause.
     Passing,
-    /// The system is too stiff for it.
+    /// The system is too stiff for the step size.
     StiffSystem,
-    /// A contact is.
+    /// A contact is too stiff for the step size.
     StiffContact,
 }
 
-/// Good steps before a step size grows, at first and at most.
+/// Good steps before the step size grows: initial and largest number.
 const PATIENCE: [u32; 2] = [2, 64];
 
 impl Pace {
@@ -128,7 +127,7 @@ impl Pace {
         }
     }
 
-    /// Of a checkpoint that was read: refuses what no run with a present step size of h leaves.
+    /// Checks values read from a checkpoint with step size h: rejects values that no run produces.
     #[cfg(feature = "serde")]
     pub(super) fn check_read(&self, h: f64) -> Result<()> {
         let Self { nominal, level, position, steps: _, grown: _, patience, kept, lasting } = *self;
@@ -146,9 +145,9 @@ impl Pace {
         count("the patience of a checkpoint", patience.into(), PATIENCE[0].into()..=PATIENCE[1].into())
     }
 
-    /// After a refusal: half the size. One that follows growth at once makes the next growth wait longer; one for a
-    /// stiffness keeps it from the size that was refused. (Between two such refusals a step that is too long adds
-    /// energy: growing back to it over and over would do so without end.)
+    /// After a rejection: halves the size. A rejection directly after growth doubles the wait before the next growth;
+    /// one for a stiffness prevents growth to the rejected size. Otherwise repeated growth to a step that is too
+    /// long, which adds energy before it is rejected, would add energy without bound.
     pub(crate) fn halve(&mut self, refusal: Refusal) {
         if self.grown && self.steps == 0 {
             self.patience = (2 * self.patience).min(PATIENCE[1]);
@@ -162,7 +161,7 @@ impl Pace {
         }
     }
 
-    /// After a good step: says whether the size may grow here. `presses` is asked whether a contact presses that may be
+    /// After a good step: returns whether the size may grow here. `presses` returns whether a pressed contact may be
     /// too stiff for larger steps.
     pub(crate) fn advance(&mut self, presses: impl FnOnce() -> bool) -> bool {
         self.position = if self.level > 0 { self.position + 1 } else { 0 };
@@ -177,14 +176,14 @@ impl Pace {
         self.level > most && self.position.is_multiple_of(2) && self.steps >= self.patience
     }
 
-    /// After a good step of size h: updates the time over which the error of a velocity lasts. Half of it remains after
-    /// a change of contacts, because a slip that reverses may stick for a step before the second change. With changes
-    /// in every step it falls to h.
+    /// After a good step of size h: updates the time for which a velocity error persists. A change of contacts halves
+    /// it only, because a reversing slip may stick for a step before the second change. With changes in every step it
+    /// tends to h.
     pub(crate) fn note_change(&mut self, changed: bool, h: f64) {
         self.lasting = (self.lasting + h) * if changed { 0.5 } else { 1.0 };
     }
 
-    /// Growth: twice the size.
+    /// Growth: doubles the size.
     pub(crate) fn double(&mut self) {
         (self.level, self.position) = (self.level - 1, self.position / 2);
         (self.steps, self.grown) = (0, true);
@@ -211,7 +210,7 @@ mod tests {
             pace.halve(Refusal::Passing);
         }
         assert_eq!(waits, [2, 4, 8, 16, 32, 64, 64, 64]);
-        // One good step after growth, and it begins anew.
+        // After one good step following growth the wait is reset.
         wait(&mut pace);
         pace.double();
         pace.advance(|| false);

@@ -1,30 +1,30 @@
-//! What a state holds of its contacts.
+//! The contact data of a state.
 
 use crate::contact::{ContactId, Tangents};
 use crate::real::Real;
 
-/// What a contact does.
+/// Status of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ContactStatus {
-    /// Apart: no force.
+    /// Open, without force.
     Open,
-    /// Closed within rounding, and not pressed.
+    /// Closed within rounding, without force.
     Touching,
-    /// Pressed (or, under an equality, held), without friction.
+    /// Pressed, or held by an equality, without friction.
     Closed,
-    /// Pressed, and held by friction.
+    /// Pressed and sticking.
     Sticking,
-    /// Pressed, and sliding: friction is μ times the force.
+    /// Pressed and sliding: friction is μ times the normal force.
     Sliding,
 }
 
-/// Which version of the names of all rows of a run a list holds: lists of one version are equal.
+/// Version of the list of contact names: lists of the same version are equal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Names(u64);
 
 impl Names {
-    /// To a version that there has not been.
+    /// Sets a new version.
     pub(crate) fn change(&mut self) {
         self.0 += 1;
     }
@@ -35,22 +35,22 @@ impl Names {
     }
 }
 
-/// (States are compared by what they hold.)
+/// States are compared by their content, not by versions.
 impl PartialEq for Names {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-/// Multipliers and flags of the contacts, one entry a candidate, in the order of the constraints and their rows.
+/// Multipliers and flags of the contacts, one entry per candidate, in the order of the constraints and their rows.
 ///
-/// Where contacts have friction the multipliers of tangential rows stand behind those of all gaps: forces, impulses,
-/// λ_v and λ_a have one entry a row.
+/// With friction, the multipliers of tangential rows follow those of all gaps: forces, impulses, λ_v and λ_a have one
+/// entry per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
     pub(crate) ids: Vec<ContactId>,
     pub(crate) tangents: Tangents,
-    /// The version of these names, if it is known.
+    /// The version of these names, if known.
     pub(crate) names: Names,
     pub(crate) lambda: Vec<T>,
     pub(crate) lambda_raw: Vec<T>,
@@ -60,8 +60,7 @@ pub struct ContactState<T> {
     pub(crate) lambda_v: Vec<T>,
     pub(crate) lambda_a: Vec<T>,
     pub(crate) dissipated: Vec<T>,
-    /// Slip, one entry a tangential row, and whether it is none but for friction's bound, one a contact; both are empty
-    /// without friction.
+    /// Slip, one entry per tangential row, and whether each contact slides; both are empty without friction.
     pub(crate) slip: Vec<T>,
     pub(crate) sliding: Vec<bool>,
 }
@@ -86,7 +85,7 @@ impl<T: Real> ContactState<T> {
         }
     }
 
-    /// Makes room for so many contacts in all.
+    /// Reserves memory for this many contacts in total.
     pub(crate) fn make_room(&mut self, rows: usize) {
         let Self { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
         ids.reserve(rows.saturating_sub(ids.len()));
@@ -96,7 +95,7 @@ impl<T: Real> ContactState<T> {
         }
     }
 
-    /// Opens every contact of `ids`.
+    /// Sets the contacts to `ids`, all open.
     pub(crate) fn reset(&mut self, ids: &[ContactId], tangents: &Tangents) {
         let n = ids.len();
         self.names = Names::default();
@@ -121,8 +120,8 @@ impl<T: Real> ContactState<T> {
         self.closed.resize(n, false);
     }
 
-    /// Copies what belongs to the same contacts from another state; contacts it does not know are open. What every
-    /// stage sets anew (impulses, λ_v, slips; gaps and λ_a of tangential rows) is anything before.
+    /// Copies the data of contacts that exist in another state; new contacts are open. Values that every stage sets
+    /// anew (impulses, λ_v, slips; gaps and λ_a of tangential rows) are undefined until then.
     pub(crate) fn carry_over(&mut self, old: &Self, (ids, names): (&[ContactId], Names), tangents: &Tangents) {
         if old.names.are(names) && self.names.are(names) {
             self.lambda.copy_from_slice(&old.lambda);
@@ -132,7 +131,7 @@ impl<T: Real> ContactState<T> {
             self.closed.copy_from_slice(&old.closed);
             self.dissipated.copy_from_slice(&old.dissipated);
             if !tangents.is_empty() {
-                // (Coefficients may have changed.)
+                // Friction coefficients may have changed.
                 self.tangents.copy_from(tangents);
                 self.sliding.copy_from_slice(&old.sliding);
             }
@@ -140,7 +139,7 @@ impl<T: Real> ContactState<T> {
         }
         self.reset(ids, tangents);
         self.names = names;
-        // Candidates that come and go shift the others: the place behind the last one found is tried first.
+        // Appearing and vanishing candidates shift the others: the position after the last match is tried first.
         let sorted = old.ids.is_sorted();
         let mut next = 0;
         for (i, id) in ids.iter().enumerate() {
@@ -167,17 +166,17 @@ impl<T: Real> ContactState<T> {
         }
     }
 
-    /// The entries of the gaps in a list of the rows.
+    /// The entries of the gaps in a list with one entry per row.
     fn normal<'v>(&self, values: &'v [T]) -> &'v [T] {
         &values[..self.ids.len()]
     }
 
-    /// The length of what a list of the rows has for the tangents of a contact.
+    /// The length of the tangential vector of a contact in a list with one entry per row.
     pub(crate) fn tangential(&self, contact: usize, values: &[T]) -> T {
         values[self.tangents.of(contact)].iter().fold(T::zero(), |length, &x| length.hypot(x))
     }
 
-    /// Which contact each entry belongs to.
+    /// The contact of each entry.
     pub fn ids(&self) -> &[ContactId] {
         &self.ids
     }
@@ -189,48 +188,50 @@ impl<T: Real> ContactState<T> {
 
     /// Contact forces, compression positive, after correction.
     ///
-    /// By schemes whose balance holds at the state, M a = f + Gᵀ λ there, to rounding. By the others λ is the force at
-    /// the time of the balance ([`Stage::load`](crate::tableau::Stage::load)): M a and f + Gᵀ λ differ by O(h) there.
+    /// In schemes whose balance holds at the state, M a = f + Gᵀ λ to rounding. In others λ is the force at the time
+    /// of the balance ([`Stage::load`](crate::tableau::Stage::load)), and M a and f + Gᵀ λ differ by O(h) at the
+    /// state.
     ///
-    /// They are values, not means over the step: summed over the steps, times h, they are not the change of momentum.
-    /// The force jumps with the velocity at an impact, and the sum misses what happens within that step (3 % on a
-    /// coarse block). [`impulses`](Self::impulses) close to rounding.
+    /// The forces are values at an instant, not means over the step: their sum over the steps times h is not the
+    /// change of momentum. The force jumps with the velocity at an impact, and the sum misses the force within that
+    /// step (3 % on a coarse block). [`impulses`](Self::impulses) balance the momentum to rounding.
     pub fn forces(&self) -> &[T] {
         self.normal(&self.lambda)
     }
 
     /// Friction forces of a contact, after correction, one along each of its
-    /// [tangents](crate::contact::Contact::tangent): |f| ≤ μ λ, and they act on the bodies as f times the tangential
-    /// row. Nothing for contacts without friction. Values, as [`forces`](Self::forces) are;
-    /// [`friction_impulses`](Self::friction_impulses) close to rounding.
+    /// [tangents](crate::contact::Contact::tangent): |f| ≤ μ λ; they act on the bodies as f times the tangential row.
+    /// Empty for contacts without friction. Like [`forces`](Self::forces) they are values at an instant;
+    /// [`friction_impulses`](Self::friction_impulses) balance the momentum to rounding.
     ///
-    /// In the plane the tangent of the constraints of this crate is (n_y, −n_x), n the direction in which the gap opens
-    /// for the first body (that of the nodes, or the slave): on a floor, to the right. In space the two tangents are
-    /// any orthonormal ones, chosen anew when normals turn; [`ContactForce`](crate::ContactForce) has them, and forces
-    /// as vectors.
+    /// In the plane the tangent of this crate's constraints is (n_y, −n_x), with n the direction in which the gap
+    /// opens for the first body (the body of the nodes, or the slave): on a floor, to the right. In space the two
+    /// tangents are arbitrary orthonormal directions, chosen anew when normals turn;
+    /// [`ContactForce`](crate::ContactForce) has the tangents, and forces as vectors.
     pub fn friction_forces(&self, contact: usize) -> &[T] {
         &self.lambda[self.tangents.of(contact)]
     }
 
-    /// Impulses of friction in the last step (force × time), corrections included, as [`impulses`](Self::impulses).
+    /// Impulses of friction in the last step (force × time), including corrections, as for
+    /// [`impulses`](Self::impulses).
     pub fn friction_impulses(&self, contact: usize) -> &[T] {
         &self.impulse[self.tangents.of(contact)]
     }
 
-    /// Velocities along the tangents with which the bodies slide on each other (length/time): those to which
-    /// [`friction_forces`](Self::friction_forces) and [`status`](Self::status) belong. They are zero but for rounding
-    /// where a contact sticks, and against friction where it slides. Nothing for contacts without friction.
+    /// Slip velocities along the tangents (length/time), which correspond to
+    /// [`friction_forces`](Self::friction_forces) and [`status`](Self::status). They are zero to rounding if a
+    /// contact sticks, and opposed to friction if it slides. Empty for contacts without friction.
     ///
-    /// They are those of the velocity of the state, after correction. Explicit schemes and dofs without mass have
-    /// velocities that are means over what was before and comes after: in the step in which such a contact stops, or
-    /// turns back, its slip is that of the way to which its force leads.
+    /// They belong to the velocity of the state, after correction. In explicit schemes and on dofs without mass,
+    /// velocities are means over the steps before and after: in the step in which such a contact stops or reverses,
+    /// its slip is the slip of the displacement caused by its force.
     pub fn slip(&self, contact: usize) -> &[T] {
         let (rows, gaps) = (self.tangents.of(contact), self.ids.len());
-        // (Contacts without friction have an empty range anywhere.)
+        // Contacts without friction have an arbitrary empty range.
         &self.slip[rows.start.saturating_sub(gaps)..rows.end.saturating_sub(gaps)]
     }
 
-    /// Raw multipliers of the last stage's contact problem; they decide release, and their impulse is h Σ β λ.
+    /// Raw multipliers of the contact problem of the last stage; they decide release, and their impulse is h Σ β λ.
     pub fn raw_forces(&self) -> &[T] {
         self.normal(&self.lambda_raw)
     }
@@ -240,7 +241,7 @@ impl<T: Real> ContactState<T> {
         &self.closed
     }
 
-    /// What a contact does, by its place in the lists.
+    /// Status of a contact, by its position in the lists.
     pub fn status(&self, contact: usize) -> ContactStatus {
         match (self.closed[contact], self.lambda_raw[contact] == T::zero()) {
             (false, _) => ContactStatus::Open,
@@ -251,27 +252,27 @@ impl<T: Real> ContactState<T> {
         }
     }
 
-    /// Impulses of the last step (force × time) along the rows, corrections included. Where normals turn within a step,
-    /// parts of it act along different normals: [`Simulation::impulses_on_dofs`](crate::Simulation::impulses_on_dofs)
-    /// has their vectors.
+    /// Impulses of the last step (force × time) along the rows, including corrections. If normals turn within a step,
+    /// parts of them act along different normals;
+    /// [`Simulation::impulses_on_dofs`](crate::Simulation::impulses_on_dofs) has their vectors.
     pub fn impulses(&self) -> &[T] {
         self.normal(&self.impulse)
     }
 
-    /// The paper's λ_v of the last correction (momentum, kg m/s): it corrected the acceleration; zero without
-    /// correction.
+    /// The paper's λ_v of the last correction of the acceleration (momentum, kg m/s); zero without correction.
     pub fn lambda_v(&self) -> &[T] {
         self.normal(&self.lambda_v)
     }
 
-    /// The paper's λ_a of the last correction (kg m): it corrected the velocity; zero without correction.
+    /// The paper's λ_a of the last correction of the velocity (kg m); zero without correction.
     pub fn lambda_a(&self) -> &[T] {
         self.normal(&self.lambda_a)
     }
 
-    /// Kinetic energy that corrections have taken from the bodies since a contact last closed, and not given back; in
-    /// the frame of the obstacle, where there is one that moves. Of contacts without mass what
-    /// [`WorkBalance`](crate::corrector::WorkBalance) still owes to the bodies, negative where they owe.
+    /// Kinetic energy that corrections have taken from the bodies since a contact last closed and have not returned,
+    /// measured in the frame of a moving obstacle. For contacts without mass, the work that
+    /// [`WorkBalance`](crate::corrector::WorkBalance) has still to return to the bodies; negative if it has still to
+    /// take work from them.
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
     }
@@ -281,7 +282,7 @@ impl<T: Real> ContactState<T> {
 mod tests {
     use super::*;
 
-    /// Contacts with these features, each with a tangent and a coefficient of its own.
+    /// Contacts with these features, each with a tangent and its own coefficient.
     fn named(features: &[usize], friction: f64) -> (Vec<ContactId>, Tangents) {
         let ids = features.iter().map(|&feature| ContactId { constraint: 0, feature, candidate: 0 }).collect();
         let mut tangents = Tangents::default();
@@ -292,7 +293,7 @@ mod tests {
         (ids, tangents)
     }
 
-    /// A state whose entries tell their contact: ten times its feature, with the tangent one more.
+    /// A state whose entries identify their contact: ten times its feature, plus one for the tangent.
     fn filled(features: &[usize], friction: f64) -> ContactState<f64> {
         let (ids, tangents) = named(features, friction);
         let mut state = ContactState::with_capacity(0);
@@ -315,7 +316,7 @@ mod tests {
     #[test]
     fn contacts_keep_what_they_had_and_new_ones_are_open() {
         let old = filled(&[1, 4, 6], 0.2);
-        // (In memory that had others before.)
+        // The memory held other contacts before.
         let mut state = filled(&[9, 8, 7], 0.2);
         let (ids, tangents) = named(&[4, 5, 6], 0.3);
         state.carry_over(&old, (&ids, Names(3)), &tangents);

@@ -10,38 +10,38 @@ use crate::simulation::Overclosures;
 pub struct History<T> {
     /// Slot 0 is spare between steps; past state k (k ≥ 1) is slot k.
     pub(crate) slots: Vec<Motion<T>>,
-    /// Number of states known, the current one included.
+    /// Number of known states, including the current one.
     pub(crate) known: usize,
-    /// Number of newest states since the motion last jumped with a contact that closed or opened, or with friction. The
-    /// first state after the jump is included.
+    /// Number of newest states since the motion last jumped because a contact closed or opened, or because of
+    /// friction; includes the first state after the jump.
     pub(crate) smooth: usize,
     pub(crate) clock: Clock,
     pub(crate) pace: Pace,
-    /// Step size that made the current state.
+    /// Step size that led to the current state.
     pub(crate) made_with: f64,
-    /// The motions as they were computed, from which changes of the step size resample; empty until it first changes.
+    /// The computed motions, from which changes of the step size resample; empty until it first changes.
     pub(crate) trail: Trail<T>,
-    /// v and a of the current state as they were computed, if a change of the step size has moved the stored ones to
-    /// another time.
+    /// v and a of the current state as computed, if a change of the step size has moved the stored ones to another
+    /// time.
     pub(crate) unmoved: [Vec<T>; 2],
-    /// (u_n − u_{n−1})/h on the dofs without mass: their velocity is differenced over two steps.
+    /// (u_n − u_{n−1})/h on the dofs without mass: their velocity is a difference over two steps.
     pub(crate) slopes: Vec<T>,
-    /// Name of the integrator: another one would read other things out of the same states.
+    /// Name of the integrator: another one would interpret the same states differently.
     pub(crate) scheme: String,
-    /// What is added to the gaps because bodies overlapped at the start.
+    /// Offsets added to the gaps because bodies overlapped at the start.
     pub(crate) overclosures: Option<Overclosures<T>>,
 }
 
-/// Motions before the current one as they were computed, newest first, whatever their spacing.
+/// Motions before the current one as computed, newest first, with any spacing.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Trail<T> {
-    /// Each with the step size that made it; those beyond `known` are spare.
+    /// Each motion with the step size that led to it; entries beyond `known` are spare.
     states: Vec<(Motion<T>, f64)>,
     known: usize,
 }
 
 impl<T: Real> Trail<T> {
-    /// Room for `length` states, the newest of which are `known`.
+    /// Memory for `length` states, the newest of which are `known`.
     pub(crate) fn new(length: usize, dofs: usize, known: &[(&Motion<T>, f64)]) -> Self {
         let mut trail = Self { states: vec![(Motion::zero(dofs), 0.0); length], known: 0 };
         for (motion, h) in known.iter().rev() {
@@ -50,7 +50,7 @@ impl<T: Real> Trail<T> {
         trail
     }
 
-    /// Room for `length` states, of which these are known.
+    /// Memory for `length` states, of which these are known.
     #[cfg(feature = "serde")]
     pub(super) fn of(known: Vec<(Motion<T>, f64)>, length: usize, dofs: usize) -> Self {
         let mut trail = Self { known: known.len(), states: known };
@@ -58,7 +58,7 @@ impl<T: Real> Trail<T> {
         trail
     }
 
-    /// Number of states that there is room for.
+    /// Capacity in states.
     #[cfg(feature = "serde")]
     pub(crate) fn room(&self) -> usize {
         self.states.len()
@@ -68,7 +68,7 @@ impl<T: Real> Trail<T> {
         self.states.is_empty()
     }
 
-    /// Puts a motion in front, without allocating; the oldest drops out.
+    /// Adds a motion at the front without allocating; the oldest is dropped.
     pub(crate) fn push(&mut self, motion: &Motion<T>, h: f64) {
         self.states.rotate_right(1);
         if let Some((front, made_with)) = self.states.first_mut() {
@@ -78,32 +78,32 @@ impl<T: Real> Trail<T> {
         }
     }
 
-    /// The newest motion, to be edited.
+    /// The newest motion, mutable.
     pub(crate) fn front(&mut self) -> Option<&mut Motion<T>> {
         self.states.first_mut().map(|(motion, _)| motion)
     }
 
-    /// All motions, those that are spare too.
+    /// All motions, including spare ones.
     #[cfg(feature = "serde")]
     pub(super) fn all(&mut self) -> impl Iterator<Item = &mut Motion<T>> {
         self.states.iter_mut().map(|(motion, _)| motion)
     }
 
-    /// The motions known.
+    /// The known motions.
     pub(crate) fn known(&self) -> impl Iterator<Item = (&Motion<T>, f64)> {
         self.states[..self.known].iter().map(|(motion, h)| (motion, *h))
     }
 }
 
 impl<T: Real> History<T> {
-    /// Step size of the run, with which one is built that goes on from here. Under
-    /// [`StepControl`](crate::StepControl) it is the nominal one, and the next step
-    /// ([`Simulation::step_size`](crate::Simulation::step_size)) may be a half of it, a quarter and so on.
+    /// Step size for building a simulation that continues this run. Under [`StepControl`](crate::StepControl) it is
+    /// the nominal one; the next step ([`Simulation::step_size`](crate::Simulation::step_size)) may be this size
+    /// halved repeatedly.
     pub fn step_size(&self) -> f64 {
         self.pace.nominal
     }
 
-    /// Number of past states known, the current one not counted.
+    /// Number of known past states, without the current one.
     pub fn len(&self) -> usize {
         self.known - 1
     }
@@ -113,14 +113,14 @@ impl<T: Real> History<T> {
         self.known <= 1
     }
 
-    /// Displacement, velocity and acceleration of past state k = 1 (the one before the current), 2, …, as later steps
-    /// read them: after a history projection they differ from what an observer saw.
+    /// Displacement, velocity and acceleration of past state k = 1 (before the current one), 2, …, as later steps
+    /// read them: after a history projection they differ from the values shown to observers.
     pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
         let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
         Some((&motion.u, &motion.v, &motion.a))
     }
 
-    /// Refuses a history that does not fit a system of this size, `slots` motions long and with `massless` dofs without
+    /// Rejects a history that does not fit a system of this size, with `slots` motions and `massless` dofs without
     /// mass.
     pub(crate) fn check(&self, dofs: usize, slots: usize, massless: usize) -> Result<()> {
         let wrong = |what, expected, found| Err(Error::Dimension { what, expected, found });

@@ -1,12 +1,12 @@
-//! Checkpoints of parts of a body: what one of several ranks has of a run, and the whole put together from all.
+//! Checkpoints of parts of a body: the share of one of several ranks, and the whole assembled from all parts.
 
 use super::{History, checkpoint::Checkpoint};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
 impl<T: Real> Checkpoint<T> {
-    /// The checkpoint of a part of the body: its dof i is dof `dofs[i]` of this one. Contacts stay as they are: what
-    /// may touch is known to every part. See [`joined`](Self::joined) for the way back.
+    /// The checkpoint of a part of the body: its dof i is dof `dofs[i]` of this one. Contacts are kept unchanged,
+    /// because every part has all candidates. [`joined`](Self::joined) is the inverse.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -39,14 +39,14 @@ impl<T: Real> Checkpoint<T> {
         Ok(part)
     }
 
-    /// The checkpoint of the whole body of `dofs` dofs, from those of parts, each with the number that its dofs have in
-    /// the whole. Where several parts have a dof, the first of them counts.
+    /// The checkpoint of the whole body of `dofs` dofs, from parts, each with the numbers of its dofs in the whole.
+    /// If several parts have a dof, the first one is used.
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`] without parts, [`Error::Dimension`] for a list of another length than its part,
-    /// [`Error::MissingDof`], [`Error::Incompatible`] for parts of different runs, instants or contacts, for a dof that
-    /// no part has, and for a run with dofs without mass.
+    /// [`Error::Empty`] without parts, [`Error::Dimension`] for a list whose length differs from its part,
+    /// [`Error::MissingDof`], [`Error::Incompatible`] for parts of different runs, instants or contacts, for a dof
+    /// that no part has, and for a run with dofs without mass.
     pub fn joined(parts: &[(Self, Vec<usize>)], dofs: usize) -> Result<Self> {
         let refuse = |reason| Err(Error::Incompatible { part: "the parts of a checkpoint".into(), reason });
         let Some((first, _)) = parts.first() else {
@@ -83,7 +83,7 @@ impl<T: Real> Checkpoint<T> {
         Ok(whole)
     }
 
-    /// Whether another part may be of the same run at the same instant.
+    /// Whether another part can belong to the same run at the same instant.
     fn is_alike(&self, other: &Self) -> bool {
         let shape = |part: &Self| {
             let History { slots, known, smooth, clock, made_with, trail, unmoved, scheme, .. } = &part.history;
@@ -106,7 +106,7 @@ impl<T: Real> Checkpoint<T> {
         }
     }
 
-    /// All vectors with an entry for each dof, in one order.
+    /// All vectors with one entry per dof, in a fixed order.
     fn vectors(&mut self) -> impl Iterator<Item = &mut Vec<T>> {
         let (state, history) = (&mut self.state, &mut self.history);
         let motions = std::iter::once(&mut state.motion).chain(&mut history.slots).chain(history.trail.all());

@@ -1,5 +1,4 @@
-//! What a file of a checkpoint holds, in this order, and what is refused of it. Whatever changes here changes
-//! [`FORMAT`].
+//! The content of a checkpoint file, in this order, and its checks. Any change here requires a new [`FORMAT`].
 
 use super::clock::{Clock, Pace};
 use super::contacts::{ContactState, Names};
@@ -22,11 +21,11 @@ const FORMAT: u32 = 5;
 /// How every file begins.
 const KIND: &str = "contact-dynamics checkpoint";
 
-/// A checkpoint as it is written, borrowed from one, or as it was read.
+/// A checkpoint borrowed for writing, or as read.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "T: Real", expecting = "a checkpoint of contact-dynamics")]
 pub(super) struct Record<'r, T: Real> {
-    // These two come first: other files are refused by them, not by what they lack.
+    // These two come first, so that other files are rejected by them, not by missing fields.
     format: Format,
     scalar: ScalarName<T>,
     scheme: Cow<'r, str>,
@@ -48,7 +47,7 @@ struct MotionRecord<'r, T: Real> {
 #[serde(bound = "T: Real")]
 struct StateRecord<'r, T: Real> {
     motion: MotionRecord<'r, T>,
-    /// v and a at the time of the state, where the stored ones live elsewhere.
+    /// v and a at the time of the state, if the stored ones have another time.
     shown: [Cow<'r, [T]>; 2],
     contacts: ContactsRecord<'r, T>,
     broken_bonds: Cow<'r, [BrokenBond]>,
@@ -67,7 +66,7 @@ struct ContactsRecord<'r, T: Real> {
     lambda_v: Cow<'r, [T]>,
     lambda_a: Cow<'r, [T]>,
     dissipated: Cow<'r, [T]>,
-    /// For each contact with friction its number, the coefficient, and the number of its tangential rows.
+    /// For each contact with friction: its number, the coefficient, and the number of its tangential rows.
     friction: Vec<(usize, f64, usize)>,
     slips: Cow<'r, [T]>,
     sliding: Cow<'r, [bool]>,
@@ -83,7 +82,7 @@ struct HistoryRecord<'r, T: Real> {
     clock: Clock,
     pace: Pace,
     made_with: f64,
-    /// Length of the trail, 0 if there is none, and the motions known of it, with the step sizes that made them.
+    /// Length of the trail, 0 if there is none, and its known motions with the step sizes that led to them.
     trail_room: usize,
     trail: Vec<(MotionRecord<'r, T>, f64)>,
     unmoved: [Cow<'r, [T]>; 2],
@@ -157,7 +156,7 @@ impl<'r, T: Real> Record<'r, T> {
         }
     }
 
-    /// State, history and the fingerprint of the rows, if a run may have left them.
+    /// State, history and fingerprint of the rows, after all checks.
     pub(super) fn checked(self) -> Result<(State<T>, History<T>, u32)> {
         let Self { format: _, scalar: _, scheme, rows, state, history } = self;
         let StateRecord { motion, shown, contacts, broken_bonds } = state;
@@ -243,7 +242,7 @@ impl<'r, T: Real> ContactsRecord<'r, T> {
     }
 }
 
-/// The tangential rows of contacts with friction among n contacts, as a file says them: in the order of the contacts.
+/// The tangential rows of contacts with friction among n contacts, from a file; contacts ascend.
 fn tangents(friction: &[(usize, f64, usize)], n: usize) -> Result<Tangents> {
     let mut tangents = Tangents::default();
     if friction.is_empty() {
@@ -264,13 +263,13 @@ fn tangents(friction: &[(usize, f64, usize)], n: usize) -> Result<Tangents> {
     Ok(tangents)
 }
 
-/// Whether the scheme stores v or a of another time than that of the state.
+/// Whether the scheme stores v or a at another time than the time of the state.
 fn is_shifted<T: Real>(state: &State<T>) -> bool {
     state.shown.iter().any(|shown| !shown.is_empty())
 }
 
-/// Number of past states that steps and changes of the step size read, when so many are known and smooth. (One-step
-/// schemes read none; where they store v or a of another time, a first change of the step size reads one.)
+/// Number of past states that steps and changes of the step size read, given the numbers of known and smooth states.
+/// One-step schemes read none; if they store v or a at another time, a first change of the step size reads one.
 fn read(known: usize, smooth: usize, shifted: bool) -> usize {
     let needed = if shifted { smooth.min(2) } else { 1 };
     known.max(needed).saturating_sub(1)
@@ -304,7 +303,7 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
         pace.check_read(clock.h)?;
         let size = |h| number("a step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite());
         size(made_with)?;
-        // No scheme keeps more: see `keep_trail`.
+        // No scheme keeps more; see `keep_trail`.
         count("the length of the trail of a checkpoint", trail_room as u64, 0..=3 * MAX_PAST as u64)?;
         count("the known length of the trail of a checkpoint", trail.len() as u64, 0..=trail_room as u64)?;
         let mut slots = vec![Motion::zero(dofs)];

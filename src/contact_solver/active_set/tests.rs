@@ -80,7 +80,7 @@ fn what_a_loaded_row_carries_into_its_neighbor_is_no_violation() {
         lambda[1]
     };
     assert!(second(4e-9) == 0.0, "{:e}", second(4e-9));
-    // What is more than that presses, by ⅔ of the miss.
+    // A larger miss gives a multiplier of ⅔ of the miss.
     assert!((second(1e-7) / (2.0 / 3.0 * 1e-7) - 1.0).abs() < 1e-7, "{:e}", second(1e-7));
 }
 
