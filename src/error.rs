@@ -345,7 +345,7 @@ pub enum Error {
     /// A factorization, or the matrices of contact, do not fit into memory or their index range.
     #[error("no memory for {what}{}", asked(*.bytes))]
     OutOfMemory {
-        /// What was to be allocated.
+        /// The data to be allocated.
         what: &'static str,
         /// Requested size; `None` if only the linear algebra library knows it, or if it exceeds the address space.
         bytes: Option<usize>,
@@ -482,7 +482,7 @@ pub enum Error {
     SilentTurn {
         /// The contact.
         contact: ContactId,
-        /// The step.
+        /// The times at the start and end of the step.
         t: [f64; 2],
         /// The change of its gap in the step with obstacles held, and the change along its row.
         change: [f64; 2],
@@ -490,7 +490,7 @@ pub enum Error {
     /// The contact problem of a frame between two bodies was not solved.
     #[error("contact on the frame: {failure}; rows are nodes of the frame")]
     Frame {
-        /// Why, in the numbering of the frame and the unit of its gaps.
+        /// The failure, in the numbering of the frame and the unit of its gaps.
         failure: ContactFailure<f64>,
     },
     /// The initial state violates a contact constraint.
@@ -513,7 +513,7 @@ pub enum Error {
          start nearer to it, or give dofs without mass some"
     )]
     StartNotBalanced {
-        /// Iterations spent.
+        /// Iterations performed.
         iterations: usize,
         /// One of the dofs.
         dof: usize,

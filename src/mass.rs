@@ -1,5 +1,5 @@
 //! Mass matrices: lumping, blending, redistribution, singular ones, the Courant numbers of a mesh, and M⁻¹ on the
-//! degrees of freedom that are free to move and have a mass.
+//! dofs that are free and have mass.
 
 mod assembly;
 mod bipenalty;
@@ -35,7 +35,7 @@ use faer::sparse::SparseColMatRef;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Mass<'a, T> {
-    /// Diagonal: one mass a dof.
+    /// Diagonal: one mass per dof.
     Lumped(&'a [T]),
     /// Symmetric, both triangles stored.
     Consistent(SparseColMatRef<'a, usize, T>),
@@ -46,7 +46,7 @@ impl<T: Real> Mass<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless x and y have one entry a dof, and for a matrix that is not square.
+    /// [`Error::Dimension`] unless x and y have one entry per dof, and for a matrix that is not square.
     pub fn product(&self, c: T, x: &[T], y: &mut [T]) -> Result<()> {
         let expected = match *self {
             Self::Lumped(mass) => mass.len(),
@@ -61,7 +61,7 @@ impl<T: Real> Mass<'_, T> {
         Ok(())
     }
 
-    /// `y += c M x` with vectors that are known to fit.
+    /// `y += c M x` for vectors of checked size.
     pub(crate) fn add_product(&self, c: T, x: &[T], y: &mut [T]) {
         match *self {
             Self::Lumped(mass) => {
@@ -74,7 +74,7 @@ impl<T: Real> Mass<'_, T> {
     }
 }
 
-/// The free dofs without mass, ascending: those whose rows of M are zero.
+/// The free dofs without mass, ascending: the dofs with zero rows of M.
 pub(crate) fn massless<T: Real>(mass: Mass<'_, T>, prescribed: &[usize]) -> Vec<usize> {
     let is_massless = |dof: usize| match mass {
         Mass::Lumped(mass) => mass[dof] == T::zero(),

@@ -11,7 +11,7 @@ pub(crate) fn zeros<T: Real>(rows: usize, columns: usize, what: &'static str) ->
     Ok(vector)
 }
 
-/// An empty vector with room for `rows · columns` entries.
+/// An empty vector with capacity for `rows · columns` entries.
 pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
     let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
     let mut vector = Vec::new();
@@ -19,13 +19,12 @@ pub(crate) fn reserve<T>(rows: usize, columns: usize, what: &'static str) -> Res
     Ok(vector)
 }
 
-/// Room for so many entries more than a vector has; its memory at least doubles when it must grow.
+/// Reserves capacity for additional entries; the capacity at least doubles when it must grow.
 pub(crate) fn make_room<T>(vector: &mut Vec<T>, entries: usize, what: &'static str) -> Result<()> {
     vector.try_reserve(entries).map_err(|_| refused::<T>(vector.len().saturating_add(entries), what))
 }
 
-/// Gives a vector `rows · columns` entries, new ones zero; the memory of one that has some at least doubles when it
-/// must grow.
+/// Resizes a vector to `rows · columns` entries, new ones zero; nonzero capacity at least doubles when it must grow.
 pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, what: &'static str) -> Result<()> {
     let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
     match vector.capacity() {
@@ -36,8 +35,8 @@ pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, wh
     Ok(())
 }
 
-/// Whether `rows · columns` entries could be had, before a part of a host or of a library asks for them that cannot
-/// return an error.
+/// Checks that `rows · columns` entries could be allocated, before code of a host or a library allocates them that
+/// cannot return an error.
 pub(crate) fn probe<T>(rows: usize, columns: usize, what: &'static str) -> Result<()> {
     reserve::<T>(rows, columns, what).map(|_| ())
 }

@@ -1,22 +1,22 @@
-//! Observers see every accepted step; they may stop the run, never change it.
+//! Observers receive every accepted step; they may stop the run but not change it.
 
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::{Energy, Statistics};
 use crate::state::{ContactStatus, State};
 
-/// Whether a run goes on.
+/// Whether a run continues.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Control {
-    /// Go on.
+    /// Continue.
     #[default]
     Continue,
     /// Stop after this step.
     Stop,
 }
 
-/// What an observer sees of an accepted step.
+/// The data of an accepted step for an observer.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct StepView<'a, T> {
@@ -26,12 +26,12 @@ pub struct StepView<'a, T> {
     pub energy: Option<Energy<T>>,
     /// Size of the step.
     pub h: f64,
-    /// Work counts since the start.
+    /// Statistics since the start.
     pub statistics: &'a Statistics,
 }
 
 impl<'a, T> StepView<'a, T> {
-    /// A view of a step, without energy: for hosts with a loop of their own that show their steps to an observer.
+    /// A view of a step without energy: for hosts with their own loop that call an observer.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -62,12 +62,13 @@ impl<'a, T> StepView<'a, T> {
     }
 }
 
-/// Sees every accepted step. Implemented for `()` (sees nothing), for pairs, for closures that return a [`Control`] or,
-/// if they may fail, a `Result<Control>`, for `&mut` of the recorders of this crate, and for observers behind
-/// `Box<dyn Observer<T>>` and `&mut dyn Observer<T>`. A host lends a recorder of its own by [`by_ref`](Self::by_ref).
-/// (That every `&mut O` is an observer cannot be said in Rust beside that every closure is one.)
+/// Receives every accepted step. Implemented for `()` (does nothing), for pairs, for closures that return a
+/// [`Control`] or, if they may fail, a `Result<Control>`, for `&mut` references to the recorders of this crate, and
+/// for `Box<dyn Observer<T>>` and `&mut dyn Observer<T>`. A host lends its own recorder with
+/// [`by_ref`](Self::by_ref), because Rust does not allow an implementation for every `&mut O` besides the one for
+/// closures.
 ///
-/// Whatever holds observers asks for all that they [want](Self::wants).
+/// A combination of observers computes everything that any of them [wants](Self::wants).
 ///
 /// ```
 /// use contact_dynamics::observer::{Control, DofRecorder, Observer, StepView, Wants};
@@ -110,11 +111,11 @@ pub trait Observer<T: Real> {
     ///
     /// # Errors
     ///
-    /// The host's own, usually [`Error::Host`](crate::Error::Host). It ends the run with this error; the step that was
-    /// observed has been taken.
+    /// The host's own, usually [`Error::Host`](crate::Error::Host). It ends the run with this error; the observed
+    /// step remains taken.
     fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control>;
 
-    /// What has to be computed for this observer besides the step itself.
+    /// Data to be computed for this observer besides the step itself.
     fn wants(&self) -> Wants {
         Wants::State
     }
@@ -128,17 +129,17 @@ pub trait Observer<T: Real> {
     }
 }
 
-/// What an observer needs to see.
+/// Data that an observer needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Wants {
-    /// State, gaps and counts: nothing is computed for it.
+    /// State, gaps and statistics: no extra computation.
     State,
-    /// Energy as well: about one product with M and one with K a step.
+    /// Energy as well: about one product with M and one with K per step.
     Energy,
 }
 
-/// So that a closure may return either.
+/// Allows a closure to return either type.
 impl From<Control> for Result<Control> {
     fn from(control: Control) -> Self {
         Ok(control)
@@ -159,7 +160,7 @@ impl<T: Real> Observer<T> for () {
 
 impl<T: Real, A: Observer<T>, B: Observer<T>> Observer<T> for (A, B) {
     fn observe(&mut self, step: &StepView<'_, T>) -> Result<Control> {
-        // Both see every step, also one that stops the run or fails for the first.
+        // Both observe every step, even if the first one stops the run or fails.
         let (first, second) = (self.0.observe(step), self.1.observe(step));
         match (first?, second?) {
             (Control::Continue, Control::Continue) => Ok(Control::Continue),
@@ -237,8 +238,8 @@ impl<T: Real> Observer<T> for DofRecorder<T> {
     }
 }
 
-/// Records the total contact force (sum of the reported multipliers), the raw one, and the impulse over time; where
-/// contacts have friction, the sum of its sizes, and how many of them stick and slide.
+/// Records the total contact force (sum of the reported multipliers), the raw one, and the impulse over time; with
+/// friction also the sum of the friction magnitudes and the numbers of sticking and sliding contacts.
 ///
 /// ```
 /// use contact_dynamics::observer::ContactRecorder;
@@ -301,13 +302,13 @@ impl<T: Real> ContactRecorder<T> {
         &self.raw_forces
     }
 
-    /// Impulse of each step, corrections included.
+    /// Impulse of each step, including corrections.
     pub fn impulses(&self) -> &[T] {
         &self.impulses
     }
 
-    /// Σ |f| over the contacts (force), f the friction after correction. (Its directions are in
-    /// [`ContactState::friction_forces`](crate::ContactState::friction_forces).)
+    /// Σ |f| over the contacts (force), f the friction after correction. Directions are in
+    /// [`ContactState::friction_forces`](crate::ContactState::friction_forces).
     pub fn friction(&self) -> &[T] {
         &self.friction
     }

@@ -1,13 +1,13 @@
-//! Reduced bodies: a few normal modes and the contact dofs in place of a mesh.
+//! Reduced bodies: a few normal modes and the contact dofs replace a mesh.
 //!
-//! A body that is struck at a few places needs a few modes and its contact dofs. [`Reduction`] makes a [`ReducedBody`]
-//! of mass and stiffness matrices: a [`LinearSystem`](crate::LinearSystem) of as many dofs, whose contact dofs have no
-//! mass, and the way from fields of the parent and back. [`Modes`] are found by a sparse eigensolver, or taken from
-//! another code. [`Blocks`] puts several bodies side by side. [`ModalPropagation`] moves them without a scheme: modes
-//! are solved exactly, under contact forces that are linear in each step.
+//! A body that is struck at a few places needs a few modes and its contact dofs. [`Reduction`] builds a
+//! [`ReducedBody`] from mass and stiffness matrices: a small [`LinearSystem`](crate::LinearSystem) whose contact dofs
+//! have no mass, with maps from fields of the parent and back. [`Modes`] are computed by a sparse eigensolver or
+//! imported from another code. [`Blocks`] combines several bodies in one system. [`ModalPropagation`] integrates them
+//! without a time scheme: modes are solved exactly, under contact forces that are linear in each step.
 //!
-//! What is new here is the taper: of the usual reductions the contact force rings, by a third and more, because the
-//! modes end abruptly. `docs/reduction.md` derives it and measures when to take it and when not.
+//! The taper is new: with the usual reductions the contact force rings, by a third and more, because the set of modes
+//! ends abruptly. `docs/reduction.md` derives the taper and measures when to use it.
 
 mod blocks;
 mod body;

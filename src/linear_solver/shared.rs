@@ -1,4 +1,5 @@
-//! Analyses that several factorizations share: the order of elimination is the expensive part of a small one.
+//! Analyses shared by several factorizations: finding the elimination order dominates the cost of a small
+//! factorization.
 
 use super::Fingerprint;
 use super::ordering::{self, Ordering};
@@ -7,7 +8,7 @@ use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::SymbolicCholesky;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The last analyses of a solver and of its clones, from whatever thread.
+/// The last analyses of a solver and of its clones, for any thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Analyses(Arc<Mutex<Vec<Analysis>>>);
 
@@ -19,13 +20,14 @@ struct Analysis {
 }
 
 impl Analyses {
-    /// A run needs two of an effective matrix, of each of its stages; more are kept than any scheme has.
+    /// A run needs two for each effective matrix of its stages; this is more than any scheme needs.
     const MOST: usize = 16;
 
-    /// The analysis of a pattern with `last` eliminated last, remembered or made and then remembered.
+    /// The analysis of a pattern with `last` eliminated last, from the cache or computed and cached.
     ///
-    /// The lock is not held meanwhile: an analysis may be shared out among the threads of a pool, each of which may be
-    /// waiting for it. Two threads that need one at the same time both make it, and it is the same.
+    /// The lock is not held during the computation: the threads of a pool may share an analysis, and each may be
+    /// waiting for the lock. Two threads that need the same analysis at the same time both compute it, with the same
+    /// result.
     pub(super) fn symbolic(
         &self,
         ordering: &Ordering,

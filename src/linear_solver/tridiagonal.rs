@@ -10,12 +10,11 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
 /// L D Lᵀ of symmetric positive definite matrices that are tridiagonal when their dofs are numbered along strings:
-/// bars, and trains of masses and springs, in any numbering, any number of them. Contact may act on one end of a
-/// string.
+/// any number of bars and trains of masses and springs, in any numbering. Contact may act on one end of a string.
 ///
-/// Two scalars a dof, no indices, and two strings at a time: faster than [`Cholesky`](super::Cholesky), with the same
-/// errors. Other structures are refused as [`Error::Incompatible`]; [`Automatic`](super::Automatic) chooses it where
-/// the structure fits.
+/// It stores two scalars per dof and no indices, and processes two strings at a time: faster than
+/// [`Cholesky`](super::Cholesky), with the same errors. Other structures are rejected as [`Error::Incompatible`];
+/// [`Automatic`](super::Automatic) selects it for suitable structures.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -53,7 +52,7 @@ impl<T: Real> LinearSolver<T> for Tridiagonal {
     }
 }
 
-/// The factorization, if the structure is one of strings.
+/// The factorization, if the structure consists of strings.
 pub(super) fn try_analyze<T: Real>(
     pattern: SymbolicSparseColMatRef<'_, usize>,
     last: &[usize],
@@ -65,11 +64,11 @@ pub(super) fn try_analyze<T: Real>(
 #[derive(Debug)]
 struct Strings {
     order: Vec<usize>,
-    /// Where each string begins and where its dofs of contact begin; the next one follows.
+    /// Start of each string, and start of its contact dofs; the next string follows.
     begins: Vec<[usize; 2]>,
 }
 
-/// Finds the strings, contact at their ends; nothing if the structure is another one, or not symmetric.
+/// Finds the strings, with contact at their ends; `None` for another structure or an unsymmetric one.
 fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Option<Strings> {
     let n = pattern.ncols();
     if pattern.nrows() != n {
@@ -90,7 +89,7 @@ fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Optio
             order.push(dof);
             let mut onward = neighbors(dof).filter(|&next| Some(next) != before);
             let next = onward.next();
-            // A third neighbor; or the entry that led here is not mirrored.
+            // A third neighbor, or the entry to the previous dof is not mirrored.
             if onward.next().is_some() || before.is_some_and(|before| !neighbors(dof).any(|row| row == before)) {
                 return None;
             }
@@ -110,14 +109,14 @@ fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Optio
         }
         begins.push([begin, begin + interior]);
     }
-    // Dofs that are not in a string form rings.
+    // Dofs that are in no string form rings.
     (order.len() == n).then_some(Strings { order, begins })
 }
 
-/// How the unknowns along the strings are numbered in the matrix.
+/// Numbering of the unknowns along the strings in the matrix.
 #[derive(Debug)]
 enum Numbering {
-    /// Runs of consecutive dofs: where each begins along the strings, its dofs, and their direction.
+    /// Runs of consecutive dofs: start of each along the strings, its dofs, and their direction.
     Runs(Vec<(usize, Range<usize>, Direction)>),
     List(Vec<usize>),
 }
@@ -128,7 +127,7 @@ enum Direction {
     Down,
 }
 
-/// Average number of dofs in a run from which runs are faster than a list.
+/// Average length of runs from which runs are faster than a list.
 const RUN: usize = 8;
 
 impl Numbering {
@@ -181,7 +180,7 @@ impl Numbering {
         }
     }
 
-    /// Calls with every place along the strings and its dof, in that order.
+    /// Calls `call` with every place along the strings and its dof, in that order.
     fn for_each(&self, mut call: impl FnMut(usize, usize)) {
         match self {
             Self::Runs(runs) => {
@@ -201,17 +200,17 @@ impl Numbering {
 struct Factor<T> {
     fingerprint: Fingerprint,
     numbering: Numbering,
-    /// Where each string begins, and where its dofs of contact begin; behind the last one the number of dofs.
+    /// Start of each string, and start of its contact dofs; the last entry is the number of dofs.
     begins: Vec<[usize; 2]>,
-    /// L below the diagonal and 1/D along the strings; zero behind each string.
+    /// L below the diagonal and 1/D along the strings; zero after each string.
     lower: Vec<T>,
     inverse: Vec<T>,
     /// One right-hand side along the strings.
     x: Vec<T>,
-    /// Where the dofs of contact are along the strings, and in the list of the ends of all strings.
+    /// Places of the contact dofs along the strings, and in the list of the ends of all strings.
     interface: Vec<usize>,
     places: Vec<usize>,
-    /// The ends of all strings: those of string s begin at `ends[s]`.
+    /// Starts of the ends of all strings: the end of string s begins at `ends[s]`.
     ends: Vec<usize>,
     on_ends: Vec<T>,
     /// Memory of the check of symmetry.
@@ -254,15 +253,15 @@ fn factorization<T: Real>(
     }))
 }
 
-/// The parts of a vector along two strings that follow one another.
+/// The parts of a vector along two consecutive strings.
 fn two<T>(x: &mut [T], [first, second]: [Range<usize>; 2]) -> [&mut [T]; 2] {
     let (x, behind) = x.split_at_mut(second.start);
     [&mut x[first], &mut behind[..second.len()]]
 }
 
 impl<T: Real> Factor<T> {
-    /// Calls with two strings at a time (the second one of the last pair may be empty): their whole ranges, and those
-    /// before the dofs of contact.
+    /// Calls `call` for two strings at a time (the second of the last pair may be empty), with their whole ranges and
+    /// the ranges before the contact dofs.
     fn pairs(begins: &[[usize; 2]], mut call: impl FnMut([Range<usize>; 2], [Range<usize>; 2])) {
         let count = begins.len() - 1;
         for first in (0..count).step_by(2) {
@@ -280,7 +279,7 @@ impl<T: Real> Factor<T> {
         });
     }
 
-    /// Backward over `part` of each string, from the solution behind it.
+    /// Backward over `part` of each string, from the solution after it.
     fn backward(&mut self, part: Part) {
         let Self { begins, lower, inverse, x, .. } = self;
         Self::pairs(begins, |whole, interior| {
@@ -297,7 +296,7 @@ impl<T: Real> Factor<T> {
         });
     }
 
-    /// Solves in place for `on_ends`, the dofs of contact at the ends of the strings, with the interior eliminated.
+    /// Solves in place for `on_ends`, the contact dofs at the ends of the strings, with the interior eliminated.
     fn solve_ends(&mut self, direction: Ends) {
         let Self { begins, lower, inverse, ends, on_ends, .. } = self;
         for (ends, begins) in ends.windows(2).zip(begins.windows(2)).filter(|(ends, _)| ends[0] < ends[1]) {
@@ -313,14 +312,14 @@ impl<T: Real> Factor<T> {
     }
 }
 
-/// What a backward sweep solves for.
+/// The unknowns of a backward sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     All,
     Interior,
 }
 
-/// Whether the ends are swept forward too.
+/// Whether the ends are also swept forward.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ends {
     Backward,
@@ -334,7 +333,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
         sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
         let Self { numbering, begins, lower, inverse, .. } = self;
         let negligible = negligible::<T>(n);
-        // Lower entry, pivot and dof of the unknown before.
+        // Lower entry, pivot and dof of the previous unknown.
         let mut before = None;
         let mut failed = None;
         let mut string = 0;

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 
-/// Refuses dofs the system does not have.
+/// Rejects dofs that the system does not have.
 pub(super) fn check_dofs(what: &'static str, dofs: &[usize], size: usize) -> Result<()> {
     match dofs.iter().find(|dof| **dof >= size) {
         Some(&dof) => Err(Error::MissingDof { what, dof, dofs: size }),
@@ -12,7 +12,7 @@ pub(super) fn check_dofs(what: &'static str, dofs: &[usize], size: usize) -> Res
     }
 }
 
-/// Which of all dofs are listed.
+/// Flags of the listed dofs.
 pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<Vec<bool>> {
     check_dofs(what, list, size)?;
     let mut flags = vec![false; size];
@@ -22,7 +22,7 @@ pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<V
     Ok(flags)
 }
 
-/// The square matrix of these entries (row, column, value), those in the same place summed in their order.
+/// The square matrix of these entries (row, column, value); entries at the same place are summed in order.
 pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
     entries.sort_by_key(|&(row, column, _)| (column, row));
     let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());

@@ -2,15 +2,15 @@
 
 use crate::error::{Result, positive};
 
-/// The mass m = k (h/2)² of [`ContactLaw::Bipenalty`](crate::ContactLaw::Bipenalty) that goes with a contact stiffness
-/// k: central differences keep their critical step for any k, if h does not exceed it (Askes, Caramés-Saddler,
+/// The mass m = k (h/2)² for a contact stiffness k, as in [`ContactLaw::Bipenalty`](crate::ContactLaw::Bipenalty):
+/// central differences keep their critical step for any k, if h does not exceed it (Askes, Caramés-Saddler,
 /// Rodríguez-Ferran, Proc. R. Soc. A 466, 2010).
 ///
-/// k in force/length, h in time. A contact row G adds k to the stiffness and m to the mass of the same motion Gᵀ, and a
-/// quotient of sums is no larger than the larger quotient: ω² ≤ max(ω²_max, k/m), with k/m = (2/h)². More mass does not
-/// reduce the critical step. But contact adds the mass to moving dofs, which changes the energy at impact;
-/// [`ContactLaw::StabilizedBipenalty`](crate::ContactLaw::StabilizedBipenalty), which includes this mass, avoids that.
-/// Schemes with another limit than ωh = 2 need m = k (h/limit)².
+/// k in force/length, h in time. A contact row G adds k to the stiffness and m to the mass of the same motion Gᵀ, and
+/// a quotient of sums is at most the larger quotient: ω² ≤ max(ω²_max, k/m), with k/m = (2/h)². A larger mass does
+/// not reduce the critical step. But contact adds the mass to moving dofs, which changes the energy at impact;
+/// [`ContactLaw::StabilizedBipenalty`](crate::ContactLaw::StabilizedBipenalty), which includes this mass, avoids
+/// that. Schemes with another limit than ωh = 2 need m = k (h/limit)².
 ///
 /// # Errors
 ///

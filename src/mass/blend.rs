@@ -1,4 +1,4 @@
-//! Mass matrices between lumped and consistent, whose dispersion can cancel that of the scheme.
+//! Mass matrices between lumped and consistent, whose dispersion can cancel the dispersion of the scheme.
 
 use super::inverse::check_definite;
 use crate::analysis::period_elongation;
@@ -8,13 +8,13 @@ use crate::sparse;
 use crate::tableau::Tableau;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 
-/// `weight · consistent + (1 − weight) · lumped`: total mass and row sums stay, the dispersion of waves changes
-/// (theory, section 14); [`optimal_weight`] is the one for which it is least.
+/// `weight · consistent + (1 − weight) · lumped`: total mass and row sums are kept, the dispersion of waves changes
+/// (theory, section 14); [`optimal_weight`] gives the least dispersion.
 ///
-/// A weight in [0, 1] gives a positive definite matrix. One beyond 1 does as long as it is below 1/(1 − θ), with θ the
+/// A weight in [0, 1] gives a positive definite matrix. A larger weight does too if it is below 1/(1 − θ), with θ the
 /// least ratio of consistent to lumped kinetic energy of an element: 3/2 for linear bars, 9/8 and 27/26 for
-/// quadrilaterals and hexahedra with constant Jacobian, 4/3 and 5/4 for linear triangles and tetrahedra. Outside [0, 1]
-/// the matrix is factorized once to make sure. Stiffness is not touched, and the lumped matrix may come from anywhere.
+/// quadrilaterals and hexahedra with constant Jacobian, 4/3 and 5/4 for linear triangles and tetrahedra. Outside [0,
+/// 1] the matrix is factorized once to check it. Stiffness is unchanged, and the lumped matrix may be any.
 ///
 /// # Errors
 ///
@@ -60,19 +60,20 @@ pub fn blend<T: Real>(
 /// cancel: ½ + 12 p Co², with p of [`period_elongation`] and the Courant number Co = c h/h_e of elements of length h_e
 /// (theory, section 14).
 ///
-/// The phase velocity of plane waves along the mesh then errs by κ⁴ instead of κ², κ = 2π h_e over the wave length.
-/// Derived for uniform bars; it carries over to waves along the axes of uniform quadrilaterals and hexahedra, not to
-/// oblique ones, nor to shear waves, which have a Courant number of their own. Damping of the scheme is not changed.
+/// The error of the phase velocity of plane waves along the mesh is then of order κ⁴ instead of κ², with κ = 2π h_e
+/// over the wave length. Derived for uniform bars; it also holds for waves along the axes of uniform quadrilaterals
+/// and hexahedra, but not for oblique waves or shear waves, which have a Courant number of their own. The damping of
+/// the scheme is unchanged.
 ///
-/// Trapezoidal rule: ½ + Co², which is possible for Co < 1. Central differences: (1 − Co²)/2, which is the lumped mass
-/// at Co = 1, where they are exact; in between a matrix must be factorized. Co → 0 gives ½ for every scheme.
+/// Trapezoidal rule: ½ + Co², possible for Co < 1. Central differences: (1 − Co²)/2, which is the lumped mass at Co =
+/// 1, where they are exact; for smaller Co a matrix must be factorized. Co → 0 gives ½ for every scheme.
 ///
 /// # Errors
 ///
-/// [`Error::Parameter`] for a Courant number that is negative or not finite, and for a weight that reaches 3/2, beyond
-/// which no blend is positive definite (in two and three dimensions [`blend`] refuses smaller ones);
-/// [`Error::Incompatible`] for schemes whose free oscillations err at first order; [`Error::Tableau`] for a tableau
-/// that defines no step.
+/// [`Error::Parameter`] for a Courant number that is negative or not finite, and for a weight of 3/2 or more, for
+/// which no blend is positive definite (in two and three dimensions [`blend`] rejects smaller weights);
+/// [`Error::Incompatible`] for schemes whose free oscillations have first-order errors; [`Error::Tableau`] for a
+/// tableau that defines no step.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, Newmark, TimeIntegrator, mass};
@@ -101,8 +102,8 @@ pub fn optimal_weight(tableau: &Tableau, courant: f64) -> Result<f64> {
     }
 }
 
-/// The weight of [`optimal_weight`], whether or not a blend with it is definite; `None` for schemes that err at first
-/// order.
+/// The weight of [`optimal_weight`], even if a blend with it is indefinite; `None` for schemes with first-order
+/// errors.
 pub(crate) fn dispersion_weight(tableau: &Tableau, courant: f64) -> Option<f64> {
     period_elongation(tableau).map(|elongation| 0.5 + 12.0 * elongation * courant * courant)
 }

@@ -38,16 +38,16 @@ pub(super) fn factor<T: Real>(
 
 /// The inverse of a consistent mass, applied to forces on few dofs at a time.
 ///
-/// A mass matrix is well conditioned once its diagonal is scaled, whatever the mesh: conjugate gradients need no more
-/// than some twenty iterations to rounding, and the memory of half of M. Entries of M⁻¹ decay fast with the distance
-/// (by 0.27 an element of linear shape functions), so that they work on the layers of dofs around the forces alone.
-/// What they do not serve has a factor: chains, whose factor is as small as M, and matrices on which a trial is slow.
+/// A mass matrix with scaled diagonal is well conditioned for any mesh: conjugate gradients need at most some twenty
+/// iterations to rounding, and the memory of half of M. Entries of M⁻¹ decay fast with distance (by 0.27 per element
+/// of linear shape functions), so only the layers of dofs around the forces are computed. A factor is used in other
+/// cases: for chains, whose factor is as small as M, and for matrices on which a trial converges slowly.
 #[derive(Debug)]
 pub(crate) struct ConsistentInverse<T: Real> {
     /// Dofs without response, ascending.
     fixed: Vec<usize>,
     layers: Layers,
-    /// 1/√m of the diagonal, by places, as the next ones are.
+    /// 1/√m of the diagonal, in the order of places, like the vectors below.
     scaling: Vec<T>,
     method: Method<T>,
     /// Zero between calls.
@@ -58,14 +58,14 @@ pub(crate) struct ConsistentInverse<T: Real> {
 enum Method<T: Real> {
     Factor {
         factor: Box<dyn Factorization<T>>,
-        /// Force and response by dofs.
+        /// Force and response in the order of dofs.
         vector: Vec<T>,
         /// Whether the factor has rows of other ranks too. All ranks then solve together, whatever their own parts of
         /// force and response are, and leave nothing out: each would leave out something else.
         spans_ranks: bool,
     },
-    /// Entries of the scaled M below its diagonal, row by row, and five vectors; five for several forces once there
-    /// are any.
+    /// Entries of the scaled M below its diagonal, row by row, and five vectors; five more for several forces once
+    /// needed.
     Iteration { pointers: Vec<usize>, columns: Vec<u32>, values: Vec<T>, vectors: Vec<T>, lanes: Vec<T> },
 }
 
@@ -78,32 +78,33 @@ impl<T: Real> std::fmt::Debug for Method<T> {
     }
 }
 
-/// The iterations that a trial may take, and its residual. Beyond them a factor is cheaper.
+/// Iteration limit and tolerance of a trial. If they are not met, a factor is cheaper.
 const TRIAL: (usize, f64) = (64, 1e-8);
 
-/// The iterations that a solve to rounding may take: far more than after a trial it does.
+/// Iteration limit of a solve to rounding: far more than needed after a successful trial.
 const LIMIT: usize = 1000;
 
-/// The part of a response below which a step ends an iteration: far below rounding, for in a body that is a million
-/// times as heavy as the other that it meets the response is smaller, and its own rounding counts.
+/// Relative size of updates at which an iteration ends. It is far below rounding: in a body a million times as heavy
+/// as the other one the response is smaller, and its own rounding matters.
 fn resolution<T: Real>() -> f64 {
     1e-3 * T::epsilon().value()
 }
 
-/// Layers of dofs around the forces to which a response is sought first. Behind so many elements of linear shape
-/// functions nothing above [`negligible`] is left.
+/// Layers of dofs around the forces in which a response is first computed. Beyond this many elements of linear shape
+/// functions no response exceeds [`negligible`].
 const LAYERS: usize = 36;
 
-/// Chains have so many entries a dof.
+/// Number of entries per dof in chains.
 const CHAIN: usize = 3;
 
-/// Entries of a response below this part of its largest one, by the square roots of their masses, change nothing.
+/// Entries of a response below this share of its largest one, scaled by the square roots of their masses, have no
+/// effect.
 fn negligible<T: Real>() -> T {
     T::of(1e-3) * T::epsilon()
 }
 
 impl<T: Real> ConsistentInverse<T> {
-    /// Forces are expected on the dofs `near`, or anywhere if there are none.
+    /// Forces are expected on the dofs `near`, or anywhere if the list is empty.
     pub(super) fn new(mass: SparseColMatRef<'_, usize, T>, prescribed: &[usize], near: &[usize]) -> Result<Self> {
         sparse::check_symmetric("mass", mass)?;
         let fixed = without_response(mass, prescribed);
@@ -126,13 +127,13 @@ impl<T: Real> ConsistentInverse<T> {
         Self::factored(&Automatic, mass, fixed, layers)
     }
 
-    /// The same by a solver that is given: of bodies over ranks, whose rows only that solver has together.
+    /// The same with a given solver: for bodies spread over ranks, whose rows only that solver has together.
     pub(super) fn through(
         solver: &dyn LinearSolver<T>,
         mass: SparseColMatRef<'_, usize, T>,
         prescribed: &[usize],
     ) -> Result<Self> {
-        // (Dofs whose mass is on other ranks look as if they had none, and couplings of other ranks lead anywhere.)
+        // Dofs whose mass is on other ranks seem to have none, and couplings on other ranks are unknown.
         let fixed = prescribed.to_vec();
         let layers = Layers::around(&[], mass, &fixed)?;
         let mut inverse = Self::factored(solver, mass, fixed, layers)?;
@@ -163,9 +164,10 @@ impl<T: Real> ConsistentInverse<T> {
         })
     }
 
-    /// Whether conjugate gradients soon converge to scattered numbers, and so M is positive definite: as long as they
-    /// find no negative curvature, what the right-hand side contains of a direction with such grows from one residual
-    /// to the next (the residual polynomial is 1 at zero and has positive roots), and of one with none it stays.
+    /// Whether conjugate gradients converge quickly for scattered numbers, so that M is positive definite. As long as
+    /// no negative curvature is found, the part of the right-hand side along a direction of negative curvature grows
+    /// from one residual to the next (the residual polynomial is 1 at zero and has positive roots), and along one of
+    /// zero curvature it stays.
     fn is_definite(&mut self) -> bool {
         for (k, (x, &scaling)) in self.response.iter_mut().zip(&self.scaling).enumerate() {
             *x = T::of(sparse::scattered_signed(k)) / scaling;
@@ -180,7 +182,7 @@ impl<T: Real> ConsistentInverse<T> {
         &self.fixed
     }
 
-    /// The place of a dof in responses: those where forces are expected come first. Beyond all responses if it has
+    /// The place of a dof in responses; places where forces are expected come first. Beyond all responses if it has
     /// none.
     pub(crate) fn place(&self, dof: usize) -> usize {
         self.layers.place(dof)
@@ -204,8 +206,8 @@ impl<T: Real> ConsistentInverse<T> {
         Ok(())
     }
 
-    /// M⁻¹ f of several f, each given by its forces (dof, f): `keep` gets the number of each and the response by
-    /// places. What is negligible at its end is left out.
+    /// M⁻¹ f for several f, each given by its forces (dof, f). `keep` receives the number of each f and its response
+    /// in the order of places, without the negligible end.
     pub(crate) fn respond<F: Iterator<Item = (usize, T)>>(
         &mut self,
         count: usize,
@@ -274,7 +276,7 @@ impl<T: Real> ConsistentInverse<T> {
         Ok(T::conjugate_gradients_side_by_side(&lower, (resolution::<T>(), LIMIT), vectors))
     }
 
-    /// Makes the solution of a lane the response.
+    /// Copies the solution of a lane to the response.
     fn take_lane(&mut self, lane: usize, end: usize) {
         if let Method::Iteration { lanes, .. } = &self.method {
             let solution = &lanes.as_chunks::<LANES>().0[..end];
@@ -284,7 +286,7 @@ impl<T: Real> ConsistentInverse<T> {
         }
     }
 
-    /// Adds forces (dof, f) to those there are.
+    /// Adds forces (dof, f) to the present ones.
     fn load(&mut self, forces: impl Iterator<Item = (usize, T)>) {
         for (dof, force) in forces {
             if let Some(own) = self.force.get_mut(self.layers.place(dof)) {
@@ -303,7 +305,7 @@ impl<T: Real> ConsistentInverse<T> {
         Ok(())
     }
 
-    /// `x += Σ c r` of responses that were found before.
+    /// `x += Σ c r` of earlier responses.
     pub(crate) fn combine<'r>(&mut self, responses: impl Iterator<Item = (T, &'r [T])>, x: &mut [T]) {
         let Self { layers, force: sum, .. } = self;
         let mut end = 0;
@@ -317,7 +319,7 @@ impl<T: Real> ConsistentInverse<T> {
         }
     }
 
-    /// Turns the force into a response, of which the places before the one returned are not negligible.
+    /// Converts the force to a response; returns the end of the places that are not negligible.
     fn solve(&mut self) -> Result<usize> {
         if let Method::Factor { spans_ranks: true, .. } = self.method {
             let result = self.force.len().checked_sub(1).map_or(Ok(0), |last| self.respond_around(last));
@@ -331,7 +333,7 @@ impl<T: Real> ConsistentInverse<T> {
         Ok(self.significant(0..end).map_or(0, |place| place + 1))
     }
 
-    /// The response to forces up to a place, and where it ends.
+    /// Computes the response to forces up to a place; returns its end.
     fn respond_around(&mut self, last: usize) -> Result<usize> {
         let all = self.layers.connected(last);
         if let Method::Factor { factor, vector, .. } = &mut self.method {
@@ -347,7 +349,7 @@ impl<T: Real> ConsistentInverse<T> {
         }
         let [begin, end] = self.layers.beyond(last, LAYERS);
         self.iterate_to_rounding(last, end)?;
-        // Where responses decay less than in linear elements, the layers chosen may not be all that matter.
+        // If responses decay more slowly than in linear elements, more layers may be needed.
         if end == all || self.significant(begin..end).is_none() {
             return Ok(end);
         }
@@ -360,7 +362,7 @@ impl<T: Real> ConsistentInverse<T> {
         let weighted = |place: usize| (self.response[place] / self.scaling[place]).abs();
         let largest = (0..range.end).map(weighted).fold(T::zero(), T::max);
         let bound = negligible::<T>() * largest;
-        // (What is not a number is not negligible.)
+        // NaN is not negligible.
         range.rev().find(|&place| weighted(place) > bound || self.response[place].is_nan())
     }
 
@@ -384,7 +386,7 @@ impl<T: Real> ConsistentInverse<T> {
         }
     }
 
-    /// Conjugate gradients on the places before `end`, from right-hand side to solution; none without such a method.
+    /// Conjugate gradients on the places before `end`, from right-hand side to solution; `None` if a factor is used.
     fn iterate(&mut self, end: usize, limit: usize, tolerance: f64) -> Option<Outcome> {
         let Method::Iteration { pointers, columns, values, vectors, .. } = &mut self.method else { return None };
         let lower = Blocks { pointers: &pointers[..=end], columns, values };
@@ -398,7 +400,7 @@ impl<T: Real> ConsistentInverse<T> {
     }
 }
 
-/// The entries of M below the diagonal that are not zero, row by row in the order of places.
+/// The nonzero entries of M below the diagonal, row by row in the order of places.
 fn lower<T: Real>(mass: SparseColMatRef<'_, usize, T>, layers: &Layers) -> Result<(Vec<usize>, Vec<u32>, Vec<T>)> {
     // The matrix is symmetric: columns are rows.
     let row = |place: usize| {
@@ -430,8 +432,8 @@ mod tests {
     use super::*;
     use faer::sparse::{SparseColMat, Triplet};
 
-    /// The mass of a rod of `cells` linear elements, 2 × 2 nodes across; `beside` is the entry beside the diagonal of
-    /// ones along it, 1/4 that of a consistent mass.
+    /// The mass of a rod of `cells` linear elements, 2 × 2 nodes across; `beside` is the off-diagonal entry for a
+    /// diagonal of ones along the rod, 1/4 for a consistent mass.
     fn rod(cells: usize, beside: f64) -> SparseColMat<usize, f64> {
         let sections = cells + 1;
         let mut entries = Vec::new();
@@ -447,7 +449,7 @@ mod tests {
         SparseColMat::try_new_from_triplets(4 * sections, 4 * sections, &entries).unwrap()
     }
 
-    /// The responses to forces on single dofs, by dofs.
+    /// The responses to forces on single dofs, in the order of dofs.
     fn responses(inverse: &mut ConsistentInverse<f64>, dofs: &[usize]) -> Vec<Vec<f64>> {
         let mut found = vec![Vec::new(); dofs.len()];
         inverse.respond(dofs.len(), |k| [(dofs[k], 1.0)].into_iter(), |k, r| found[k] = r.to_vec()).unwrap();
@@ -463,7 +465,7 @@ mod tests {
 
     #[test]
     fn responses_satisfy_their_equations_near_and_far() {
-        // The second kind decays by half a layer: 36 layers are not enough.
+        // The second kind decays by one half per layer: 36 layers are not enough.
         for (beside, is_local) in [(0.25, true), (0.4, false)] {
             let mass = rod(120, beside);
             let dofs = mass.ncols();
@@ -479,13 +481,13 @@ mod tests {
                 left[dof] -= 1.0;
                 left[9] = 0.0;
                 assert!(x[9] == 0.0 && left.iter().all(|x| x.abs() < 4e-15), "{beside} {dof}");
-                // (Dof 9 is on the line of dof 1 and shields all behind it: M is a product of one along and one
-                // across.)
+                // Dof 9 is on the line of dof 1 and shields all dofs beyond: M is a product of a matrix along and one
+                // across.
                 assert_eq!(x[4 * 50] == 0.0, is_local || dof == 1, "{beside} {dof}");
-                // The same alone, and among others.
+                // The response alone equals the response among others.
                 assert_eq!(responses(&mut inverse, &[dof])[0], *x);
             }
-            // And by the other way, with any force.
+            // The same by the other method, with any force.
             let mut whole = ConsistentInverse::new(mass.as_ref(), &[9], &[]).unwrap();
             for at in [2, 300] {
                 let mut x = vec![0.0; dofs];
@@ -518,7 +520,7 @@ mod tests {
             left[1] -= 1.0;
             assert!(left.iter().all(|x| x.abs() < 1e-12));
         }
-        // Everything prescribed.
+        // All dofs prescribed.
         let mut none = ConsistentInverse::new(rod(1, 0.25).as_ref(), &[0, 1, 2, 3, 4, 5, 6, 7], &[0]).unwrap();
         let mut x = [1.0; 8];
         none.apply(&mut x).unwrap();
@@ -529,7 +531,7 @@ mod tests {
     fn failures_have_a_name() {
         let mass = rod(20, 0.25);
         let mut inverse = ConsistentInverse::new(mass.as_ref(), &[], &[0]).unwrap();
-        // What no trial lets through.
+        // A matrix that no trial accepts.
         if let Method::Iteration { values, .. } = &mut inverse.method {
             for x in values.iter_mut() {
                 *x *= 3.0;

@@ -9,18 +9,18 @@ use crate::real::Real;
 use crate::sparse;
 use faer::sparse::SparseColMatRef;
 
-/// An estimate of the Courant number c h/h_e at every dof, from mass, stiffness and step: ½ h √(Σ_j |K_ij| / m_i), m
-/// the lumped mass (row sums of a consistent one).
+/// An estimate of the Courant number c h/h_e at every dof, from mass, stiffness and step: ½ h √(Σ_j |K_ij| / m_i),
+/// with m the lumped mass (row sums of a consistent one).
 ///
-/// Exact at every node of a uniform bar of linear elements, at its ends too. In general it is a bound by Gershgorin's
-/// circles: no mode of the lumped system has Ω = ωh above twice the largest value, so central differences are stable if
-/// none exceeds 1, and a step for explicit schemes may be chosen by it. For dofs of different units (rotations) single
-/// values have no meaning, but the bound holds.
+/// Exact at every node of a uniform bar of linear elements, including its ends. In general it is a bound by
+/// Gershgorin's circles: all modes of the lumped system have Ω = ωh at most twice the largest value, so central
+/// differences are stable if all values are at most 1, and a step for explicit schemes may be chosen from it. For
+/// dofs of different units (rotations) single values have no meaning, but the bound holds.
 ///
-/// In solids it exceeds the number of dilatational waves along the edges of an element: on blocks of equal square
-/// quadrilaterals (plane strain) with ν = 0.3 by 9 to 20 %, of cubic hexahedra by 17 to 37 %, while the highest mode is
-/// 2 % and 4 % above that number (tests/mass/blend.rs). For [`optimal_weight`](super::optimal_weight) c h/h_e itself is
-/// better, where it is known.
+/// In solids it exceeds the Courant number of dilatational waves along the edges of an element: on blocks of equal
+/// square quadrilaterals (plane strain) with ν = 0.3 by 9 to 20 %, of cubic hexahedra by 17 to 37 %, while the
+/// highest mode is 2 % and 4 % above that number (tests/mass/blend.rs). For [`optimal_weight`](super::optimal_weight)
+/// use c h/h_e itself, if known.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! M⁻¹ on the degrees of freedom that are free to move and have a mass.
+//! M⁻¹ on the dofs that are free and have mass.
 
 use super::Mass;
 use super::consistent::{ConsistentInverse, factor, without_response};
@@ -7,7 +7,7 @@ use crate::linear_solver::{Automatic, LinearSolver};
 use crate::real::Real;
 use faer::sparse::SparseColMatRef;
 
-/// M⁻¹ on the free dofs that have a mass: the others have no response, their rows and columns are left out of M.
+/// M⁻¹ on the free dofs that have mass: other dofs have no response, and their rows and columns are left out of M.
 #[derive(Debug)]
 pub(crate) enum InverseMass<T: Real> {
     /// 1/m, zero on dofs without response.
@@ -16,7 +16,7 @@ pub(crate) enum InverseMass<T: Real> {
 }
 
 impl<T: Real> InverseMass<T> {
-    /// Forces will act above all on the dofs `near`; nowhere in particular if there are none.
+    /// Forces act mostly on the dofs `near`, or anywhere if the list is empty.
     pub(crate) fn new(mass: Mass<'_, T>, prescribed: &[usize], near: &[usize]) -> Result<Self> {
         match mass {
             Mass::Lumped(mass) => {
@@ -34,8 +34,7 @@ impl<T: Real> InverseMass<T> {
         }
     }
 
-    /// `x ← M⁻¹ x`, zero on dofs without response.
-    /// The same with a solver that is given, for consistent masses.
+    /// The same with a given solver, for consistent masses.
     pub(crate) fn through(solver: &dyn LinearSolver<T>, mass: Mass<'_, T>, prescribed: &[usize]) -> Result<Self> {
         match mass {
             Mass::Lumped(_) => Self::new(mass, prescribed, &[]),
@@ -45,6 +44,7 @@ impl<T: Real> InverseMass<T> {
         }
     }
 
+    /// `x ← M⁻¹ x`, zero on dofs without response.
     pub(crate) fn apply(&mut self, x: &mut [T]) -> Result<()> {
         match self {
             Self::Lumped(inverse) => x.iter_mut().zip(inverse).for_each(|(x, i)| *x *= *i),
@@ -54,7 +54,7 @@ impl<T: Real> InverseMass<T> {
     }
 }
 
-/// Refuses a matrix that is not positive definite on the dofs that are not prescribed and have a mass.
+/// Rejects a matrix that is not positive definite on the dofs that are free and have mass.
 pub(super) fn check_definite<T: Real>(mass: SparseColMatRef<'_, usize, T>, prescribed: &[usize]) -> Result<()> {
     factor(&Automatic, mass, &without_response(mass, prescribed)).map(|_| ())
 }

@@ -1,24 +1,24 @@
-//! An order of the dofs of a matrix by their distance, in couplings, from some of them.
+//! An order of the dofs of a matrix by their distance, counted in couplings, from given dofs.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
 use faer::sparse::SparseColMatRef;
 
-/// Dofs in layers: those in the first, whatever they are coupled with in the next, and so on; behind them all others,
-/// which nothing couples with these. Dofs left out have no place.
+/// Dofs in layers: the given ones in the first, the dofs coupled to them in the next, and so on; then all dofs
+/// without any coupling to these. Dofs left out have no place.
 #[derive(Debug)]
 pub(super) struct Layers {
     /// The dof of each place, and the place of each dof.
     order: Vec<u32>,
     places: Vec<u32>,
-    /// Where each layer ends.
+    /// End of each layer.
     ends: Vec<usize>,
 }
 
 /// A dof without a place.
 const NONE: u32 = u32::MAX;
 
-/// Colors of dofs: those of one color and one layer are not coupled, so that none of them waits for another in a sweep.
+/// Colors of dofs: dofs of one color and one layer are not coupled, so that a sweep can process them independently.
 struct Colors<'a, T> {
     matrix: SparseColMatRef<'a, usize, T>,
     colors: Vec<u8>,
@@ -27,8 +27,7 @@ struct Colors<'a, T> {
 const NO_COLOR: u8 = u8::MAX;
 
 impl Layers {
-    /// Layers around the dofs `near`, or all dofs as one layer if there are none of these. Entries of value zero couple
-    /// nothing.
+    /// Layers around the dofs `near`, or all dofs as one layer if the list is empty. Stored zeros couple no dofs.
     pub(super) fn around<T: Real>(
         near: &[usize],
         matrix: SparseColMatRef<'_, usize, T>,
@@ -37,13 +36,13 @@ impl Layers {
         let dofs = matrix.ncols();
         let count = u32::try_from(dofs).map_err(|_| Error::OutOfMemory { what: "indices of 32 bits", bytes: None })?;
         let mut places = vec![NONE; dofs];
-        // (A place that no layer has, until the dofs left out lose it again.)
+        // A temporary place, until the dofs left out lose it again.
         for &dof in left_out {
             places[dof] = count;
         }
         let mut order = Vec::with_capacity(dofs - left_out.len());
         let mut ends = Vec::new();
-        // (All numbers of dofs have just been seen to fit.)
+        // All dof numbers fit, as checked above.
         #[allow(clippy::cast_possible_truncation)]
         let mut take = |dof: usize, order: &mut Vec<u32>| {
             if places[dof] == NONE {
@@ -89,7 +88,7 @@ impl Layers {
         &self.order
     }
 
-    /// The place of a dof, beyond all others if it has none.
+    /// The place of a dof; beyond all others if it has none.
     pub(super) fn place(&self, dof: usize) -> usize {
         self.places[dof] as usize
     }
@@ -99,8 +98,8 @@ impl Layers {
         self.ends[0]
     }
 
-    /// Where the layer ends that is `distance` beyond that of a place, and where it begins; the end of all that is
-    /// coupled with it if there are fewer.
+    /// Start and end of the layer `distance` beyond the layer of a place; the end of all dofs coupled to it if there
+    /// are fewer layers.
     pub(super) fn beyond(&self, place: usize, distance: usize) -> [usize; 2] {
         let own = self.ends.partition_point(|&end| end <= place);
         let far = own + distance;
@@ -110,7 +109,7 @@ impl Layers {
         }
     }
 
-    /// The end of all that may be coupled with a place.
+    /// The end of all dofs that may be coupled to a place.
     pub(super) fn connected(&self, place: usize) -> usize {
         let reached = self.ends.last().copied().unwrap_or(0);
         if place < reached { reached } else { self.order.len() }
@@ -118,7 +117,7 @@ impl Layers {
 }
 
 impl<T: Real> Colors<'_, T> {
-    /// Sorts a layer that starts at a place by the colors of its dofs, each the first that none before it has taken.
+    /// Sorts a layer that starts at a place by color; each dof gets the first color that no earlier coupled dof has.
     fn sort(&mut self, start: usize, layer: &mut [u32], places: &mut [u32]) {
         let own = start..start + layer.len();
         for &dof in layer.iter() {
@@ -130,7 +129,7 @@ impl<T: Real> Colors<'_, T> {
                     taken |= 1 << color;
                 }
             }
-            // (Where so many are coupled with one another the last color is taken by several.)
+            // If too many dofs are coupled to each other, several share the last color.
             self.colors[dof] = u8::try_from(taken.trailing_ones().min(63)).unwrap_or(0);
         }
         layer.sort_by_key(|&dof| self.colors[dof as usize]);

@@ -6,12 +6,12 @@ use crate::sparse;
 use faer::sparse::SparseColMatRef;
 use std::collections::BTreeMap;
 
-/// Row-sum lumping: the diagonal matrix with the same row sums, hence the same total mass.
+/// Row-sum lumping: the diagonal matrix with the same row sums and so the same total mass.
 ///
 /// # Errors
 ///
-/// [`Error::Mass`] if a row sum is not positive (those of quadratic elements; [`lump_diagonal`] takes them), with the
-/// dof and the sum.
+/// [`Error::Mass`] if a row sum is not positive, with the dof and the sum. This occurs for quadratic elements; use
+/// [`lump_diagonal`] for them.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -34,23 +34,23 @@ pub fn lump<T: Real>(mass: SparseColMatRef<'_, usize, T>) -> Result<Vec<T>> {
 /// Rock, Zienkiewicz, Earthq. Eng. Struct. Dyn. 4, 1976).
 ///
 /// `groups` gives every dof a number; dofs with the same number share one total, the sum of all entries between them.
-/// Directions are groups of their own (`dof % 3` for three dofs a node), rotations too: their units differ. Bodies may
-/// be.
+/// Directions should be separate groups (`dof % 3` for three dofs per node), and so should rotations, whose units
+/// differ. Bodies may be.
 ///
-/// The method of the paper scales **element by element**: for that, call this on each element's matrix before assembly.
-/// On an assembled matrix there is one factor for all elements of a group. Both agree where all elements have the same
-/// quotient of mass and trace, whatever their sizes and densities: one kind of element with constant Jacobian (bars,
-/// straight triangles and tetrahedra, parallelograms, parallelepipeds). If these are linear, both equal the row sums of
-/// [`lump`] as well. On distorted quadrilaterals and hexahedra the three differ; in a group that mixes kinds of
+/// The method of the paper scales **element by element**: for that, call this on each element's matrix before
+/// assembly. On an assembled matrix all elements of a group share one factor. Both agree if all elements have the
+/// same quotient of mass and trace, for any sizes and densities: one kind of element with constant Jacobian (bars,
+/// straight triangles and tetrahedra, parallelograms, parallelepipeds). If these are linear, both also equal the row
+/// sums of [`lump`]. On distorted quadrilaterals and hexahedra the three differ; in a group that mixes kinds of
 /// elements the one factor moves mass from one kind to the other.
 ///
-/// Masses are positive whatever the element, where row sums are not: a corner of the square 8-node quadrilateral
-/// of mass m has the row sum −m/12 and is given 3m/76.
+/// Masses are positive for any element, unlike row sums: a corner of the square 8-node quadrilateral of mass m has
+/// the row sum −m/12 and gets 3m/76.
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] if the matrix is not square or `groups` is not one number a dof, [`Error::Mass`] with the first
-/// dof whose diagonal entry or scaled mass is not positive.
+/// [`Error::Dimension`] if the matrix is not square or `groups` does not have one number per dof, [`Error::Mass`]
+/// with the first dof whose diagonal entry or scaled mass is not positive.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -84,7 +84,7 @@ pub fn lump_diagonal<T: Real>(mass: SparseColMatRef<'_, usize, T>, groups: &[usi
     Ok(lumped)
 }
 
-/// Refuses masses that are not positive and finite.
+/// Rejects masses that are not positive and finite.
 pub(super) fn check_positive<T: Real>(mass: &[T]) -> Result<()> {
     match mass.iter().position(|&m| !(m > T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),

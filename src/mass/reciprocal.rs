@@ -8,38 +8,38 @@ use crate::real::Real;
 use faer::sparse::SparseColMat;
 
 /// A sparse inverse of the mass matrix, assembled directly: C = A⁻¹ (Σ_e L_eᵀ A_e M_e⁻¹ A_e L_e) A⁻¹ with the lumped
-/// element masses A_e = diag(M_e 1) and A = Σ_e L_eᵀ A_e L_e (Tkachuk, Bischoff, Int. J. Numer. Methods Eng. 101, 2015;
-/// González, Kolman, Cho, Felippa, Park, same journal 113, 2018). It stands for M⁻¹, unit 1/mass, and has the pattern
-/// of the elements.
+/// element masses A_e = diag(M_e 1) and A = Σ_e L_eᵀ A_e L_e (Tkachuk, Bischoff, Int. J. Numer. Methods Eng. 101,
+/// 2015; González, Kolman, Cho, Felippa, Park, same journal 113, 2018). It replaces M⁻¹ (unit 1/mass) and has the
+/// pattern of the elements.
 ///
-/// `elements` are pairs of dofs and the row-major element matrix. Momentum p = A v is taken element by element, with
-/// velocities M_e⁻¹ A_e A⁻¹ p, which are averaged back on the nodes with A: v = C p. An explicit step is
+/// `elements` are pairs of dofs and the row-major element matrix. Momentum p = A v gives element velocities M_e⁻¹ A_e
+/// A⁻¹ p, which are averaged at the nodes with A: v = C p. An explicit step is
 ///
 /// ```text
 /// v ← v + h C (f + Gᵀ λ),   u ← u + h v
 /// ```
 ///
-/// With A 1 the momentum of a uniform unit velocity, C A 1 = 1: rigid translation is exact, total momentum is 1ᵀA v
-/// whatever M_e, and forces change it by h 1ᵀf exactly. Symmetric; positive definite as all M_e are. Lumped elements
-/// give 1/A.
+/// For the momentum A 1 of a uniform unit velocity, C A 1 = 1: rigid translation is exact, total momentum is 1ᵀA v
+/// for any M_e, and forces change it by exactly h 1ᵀf. C is symmetric, and positive definite if all M_e are. Lumped
+/// elements give 1/A.
 ///
-/// Of the frequencies of a bar of equal linear elements the error is (r/4 − 1/3) (kh)²/2 with r the quotient of the
-/// lumped and the given mass of the element's alternating motion: +5/24 (kh)² for consistent elements (r = 3), where
-/// the consistent M has +1/24 and the lumped −1/24. With 3/8 consistent and 5/8 lumped (r = 4/3) the error is of fourth
-/// order. The critical step of a free bar is 1/√r of the lumped one; elements with r < 1 allow larger steps, at the
-/// price of frequencies too low.
+/// The frequency error for a bar of equal linear elements is (r/4 − 1/3) (kh)²/2, with r the quotient of lumped and
+/// given mass for the element's alternating motion: +5/24 (kh)² for consistent elements (r = 3); the consistent M has
+/// +1/24 and the lumped one −1/24. With 3/8 consistent and 5/8 lumped (r = 4/3) the error is of fourth order. The
+/// critical step of a free bar is 1/√r of the lumped one; elements with r < 1 allow larger steps, with frequencies
+/// that are too low.
 ///
-/// Supports: leave rows and columns of fixed dofs out, as if they had no momentum; a bar fixed at one end keeps these
+/// Supports: leave out rows and columns of fixed dofs, as if they had no momentum; a bar fixed at one end keeps these
 /// orders (`tests/mass/reciprocal.rs`).
 ///
-/// Known failure: elements with row sums that are not positive (quadratic ones) are refused.
+/// Known failure: elements with row sums that are not positive (quadratic ones) are rejected.
 ///
 /// # Errors
 ///
-/// [`Error::MissingDof`] for dofs beyond `size`, [`Error::Dimension`] for an element matrix of another size than its
-/// dofs, [`Error::MatrixNotFinite`], [`Error::Asymmetric`] (row and column are dofs of the system); [`Error::Mass`] for
-/// the row sum of an element that is not positive, and for a dof that no element has; [`Error::Singular`] for an
-/// element matrix that is not positive definite.
+/// [`Error::MissingDof`] for dofs beyond `size`, [`Error::Dimension`] for an element matrix whose size differs from
+/// its number of dofs, [`Error::MatrixNotFinite`], [`Error::Asymmetric`] (row and column are dofs of the system);
+/// [`Error::Mass`] for a row sum of an element that is not positive, and for a dof of no element; [`Error::Singular`]
+/// for an element matrix that is not positive definite.
 ///
 /// ```
 /// use contact_dynamics::mass;
@@ -78,7 +78,7 @@ pub fn reciprocal<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
         for (i, (&dof, &mass)) in dofs.iter().zip(&own).enumerate() {
             lumped[dof] += mass;
             for (j, &other) in dofs.iter().enumerate() {
-                // The mean of both triangles: symmetric to the last bit.
+                // The mean of both triangles is bitwise symmetric.
                 let value = T::of(0.5) * (mass * inverse[i + j * n] + own[j] * inverse[j + i * n]);
                 entries.push((dof, other, value));
             }
@@ -89,7 +89,7 @@ pub fn reciprocal<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
         // The product first: it is the same on both sides of the diagonal.
         *value /= lumped[*row] * lumped[*column];
     }
-    // Products of dofs that the element does not couple.
+    // Removes products of dofs that the element does not couple.
     entries.retain(|&(row, column, value)| row == column || value != T::zero());
     assembled(size, entries)
 }
@@ -101,7 +101,7 @@ fn of_element(error: Error, dofs: &[usize]) -> Error {
     }
 }
 
-/// Refuses element matrices of another size than their dofs, with entries that are not finite, or not symmetric.
+/// Rejects element matrices that do not fit their dofs, are not finite, or not symmetric.
 fn check_element<T: Real>(dofs: &[usize], matrix: &[T], size: usize) -> Result<()> {
     let n = dofs.len();
     if matrix.len() != n * n {

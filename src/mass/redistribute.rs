@@ -1,4 +1,4 @@
-//! Mass redistribution: contact dofs without mass, their mass on others.
+//! Mass redistribution: moves the mass of contact dofs to others.
 
 use super::assembly::{assembled, check_dofs, flags};
 use super::inverse::check_definite;
@@ -8,78 +8,78 @@ use crate::sparse;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeMap;
 
-/// Which dofs take over the mass of those that [`redistribute`] and [`redistribute_consistent`] make massless.
+/// Which dofs receive the mass of the dofs that [`redistribute`] and [`redistribute_consistent`] make massless.
 ///
-/// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, that meets its conditions
-/// (theory, section 14); they differ in how far mass may go and in what is kept besides the total.
+/// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, under its conditions
+/// (theory, section 14); the options differ in how far mass may move and in what is kept besides the total.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Redistribution<'a> {
-    /// The neighbors of each massless dof that keep mass, in proportion to their mass (Hager, Hüeber, Wohlmuth, Int. J.
-    /// Numer. Methods Eng. 73, 2008, do the like by quadrature in the elements at the contact boundary).
+    /// The neighbors of each massless dof that keep mass, in proportion to their mass (Hager, Hüeber, Wohlmuth, Int.
+    /// J. Numer. Methods Eng. 73, 2008, do the same by quadrature in the elements at the contact boundary).
     ///
-    /// Neighbors are the dofs of the same group in the dof's column of this pattern, usually that of the stiffness
-    /// matrix; stored zeros count. Each group keeps its total. Its center of mass moves inward by the order of h_e²,
-    /// and its inertia changes as much; frequencies change by the order of h_e³. The end of a uniform bar gives its
-    /// neighbor 3/2 of its mass.
+    /// Neighbors are the dofs of the same group in the dof's column of this pattern, usually the pattern of the
+    /// stiffness matrix; stored zeros count. Each group keeps its total. Its center of mass moves inward by the order
+    /// of h_e², and its inertia changes as much; frequencies change by the order of h_e³. The end of a uniform bar
+    /// gives its neighbor 3/2 of its mass.
     Neighbors(SymbolicSparseColMatRef<'a, usize>),
     /// All dofs of the group that keep mass, in proportion to their mass: the body becomes denser.
     ///
     /// Each group keeps its total. Centers of mass, inertia and frequencies change by the order of h_e.
     Uniform,
-    /// As `Uniform`, and the neighbors of massless dofs give away a fraction of their mass too.
+    /// As `Uniform`, but the neighbors of massless dofs also give away a fraction of their mass.
     ///
-    /// The mass then begins softly behind the contact, so that the force of an impact rises without overshoot: between
-    /// bars a fraction of 0.15 takes it from 8 % to 3 % (docs/corrections.md). Each group keeps its total, the rest is
-    /// as for `Uniform`.
+    /// The mass then increases gradually behind the contact, so that the force of an impact rises without overshoot:
+    /// between bars a fraction of 0.15 reduces the overshoot from 8 % to 3 % (docs/corrections.md). Each group keeps
+    /// its total; otherwise as for `Uniform`.
     Tapered {
-        /// Neighbors are the dofs of the same group in the column of a massless dof of this pattern, usually that of
-        /// the stiffness matrix.
+        /// Neighbors are the dofs of the same group in the column of a massless dof of this pattern, usually the
+        /// pattern of the stiffness matrix.
         neighbors: SymbolicSparseColMatRef<'a, usize>,
-        /// In [0, 1): of their row sums of M.
+        /// In [0, 1), relative to their row sums of M.
         fraction: f64,
     },
-    /// The smallest change that keeps ψᵀ M ψ′ for every pair of some motions, in each group (Khenous, Laborde, Renard
-    /// 2008, with the mass norm in place of that of the entries of M).
+    /// The smallest change that keeps ψᵀ M ψ′ for every pair of given motions in each group (Khenous, Laborde, Renard
+    /// 2008, with the mass norm instead of the norm of the entries of M).
     ///
-    /// With the [`affine_motions`] 1, x, y, z these are total mass, center of mass and all second moments: momentum and
-    /// kinetic energy of every rigid and every affine motion stay. Frequencies still change by the order of h_e if the
-    /// whole body takes part, because mass has to come from afar (theory, section 14).
+    /// With the [`affine_motions`] 1, x, y, z these are total mass, center of mass and all second moments: momentum
+    /// and kinetic energy of every rigid and every affine motion are kept. Frequencies still change by the order of
+    /// h_e if the whole body takes part, because mass must come from far away (theory, section 14).
     ///
-    /// On coarse meshes a mass would become negative, which is refused: a block needs 4 layers of elements for a whole
-    /// side of it to be massless.
+    /// On coarse meshes a mass would become negative, which is an error: a block needs 4 layers of elements for a
+    /// whole massless side.
     LeastSquares {
-        /// Motions ψ, each one value a dof. Only values within a group are multiplied with each other.
+        /// Motions ψ, each with one value per dof. Only values within a group are multiplied with each other.
         motions: &'a [Vec<f64>],
-        /// Dofs that may take mass, in any order; massless ones among them are skipped. `None`: all of the group.
+        /// Dofs that may receive mass, in any order; massless ones among them are skipped. `None`: all of the group.
         ///
-        /// Receivers near the massless dofs leave the rest of the body as it is. The fewer they are, the sooner a mass
-        /// becomes negative.
+        /// If only dofs near the massless ones receive mass, the rest of the body is unchanged. The fewer they are,
+        /// the sooner a mass becomes negative.
         receivers: Option<&'a [usize]>,
     },
 }
 
-/// Takes the mass of some dofs and gives it to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech.
-/// A/Solids 27, 2008).
+/// Moves the mass of some dofs to others, for a lumped mass (Khenous, Laborde, Renard, Eur. J. Mech. A/Solids 27,
+/// 2008).
 ///
-/// Without mass at contact dofs the contact force makes no velocity jump: a semi-discrete solution has bounded
-/// accelerations, and conserves energy also at impact. The balance of such a dof is static, and M has no inverse.
+/// Without mass at contact dofs the contact force causes no velocity jump: a semi-discrete solution has bounded
+/// accelerations and conserves energy, also at impact. The balance of such a dof is static, and M has no inverse.
 ///
-/// `massless` lists dofs in any order: the contact nodes' in the normal direction if that is along an axis, otherwise
-/// in all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass stays among
-/// dofs with the same number. Directions are groups of their own (`dof % 3`), bodies should be. Groups without massless
-/// dofs take no part: give supports a number of their own, since mass given to them would be lost to the motion.
+/// `massless` lists dofs in any order: the contact nodes' dofs in the normal direction if that is along an axis,
+/// otherwise in all directions. `groups` gives every dof a number as in [`lump_diagonal`](super::lump_diagonal); mass
+/// stays among dofs with the same number. Directions must be separate groups (`dof % 3`), bodies should be. Groups
+/// without massless dofs are unchanged. Give supports a group of their own, since mass moved to them would be lost to
+/// the motion.
 ///
-/// The result is zero on massless dofs, positive on all others. Where only normal directions are massless the masses of
-/// a node differ from direction to direction: each direction keeps its own inertia, but for a node that turns far that
-/// is no longer the inertia of a body. For large rotations make all directions massless.
+/// The result is zero on massless dofs and positive on all others. If only normal directions are massless, the masses
+/// of a node differ between directions: each direction keeps its own inertia, but for a node that rotates far this is
+/// no longer the inertia of a body. For large rotations make all directions massless.
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] for sizes that do not agree, [`Error::MissingDof`] for listed dofs out of range;
-/// [`Error::Mass`] for a mass that is not positive (zero is admitted on massless dofs) or would not be in the end, with
-/// the dof and that mass; [`Error::Incompatible`] if no dof is left to take the mass of another one, or none that could
-/// keep the motions;
+/// [`Error::Dimension`] for sizes that disagree, [`Error::MissingDof`] for listed dofs out of range; [`Error::Mass`]
+/// for a mass that is not positive (zero is allowed on massless dofs) or would not be in the result, with the dof and
+/// that mass; [`Error::Incompatible`] if no dof can receive the mass of another one, or no dofs can keep the motions;
 /// [`Error::Empty`], [`Error::NotFinite`] for the motions.
 ///
 /// ```
@@ -114,21 +114,22 @@ pub fn redistribute<T: Real>(
 
 /// As [`redistribute`] for a consistent or blended mass matrix, both triangles stored.
 ///
-/// Rows and columns of the massless dofs are left out. What another dof loses with them it gets back on its own
-/// diagonal, so that its row sum stays; the row sums of the massless dofs, which are their lumped masses, are then
-/// given away. Neighbors get their shares on the diagonal, in proportion to that of M. The other options change the
-/// density, Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix stays like one of a consistent mass, and a lumped mass is a special case.
+/// Rows and columns of the massless dofs are left out. Other dofs get the couplings that they lose added to their
+/// diagonal, so that their row sums stay; the row sums of the massless dofs, which are their lumped masses, are then
+/// distributed. Neighbors get their shares on the diagonal, in proportion to the diagonal of M. The other options
+/// change the density, Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix keeps the form of a consistent mass, and a lumped mass is a
+/// special case.
 ///
-/// With [`Redistribution::Uniform`], lumping of the result gives what [`redistribute`] makes of the lumped mass; with
-/// neighbors, too, if the diagonal is in one proportion to the row sums (one kind of linear element with constant
-/// Jacobian). Least squares keep the inertia of this matrix, which is not that of the lumped one.
+/// With [`Redistribution::Uniform`], lumping the result gives the [`redistribute`]d lumped mass; with neighbors too,
+/// if the diagonal is proportional to the row sums (one kind of linear element with constant Jacobian). Least squares
+/// keep the inertia of this matrix, which differs from the inertia of the lumped one.
 ///
-/// Shares of neighbors that are not negative leave M positive definite on the dofs that keep mass, if it was. In all
-/// other cases (couplings of quadratic elements are negative, density may fall) the result is factorized once to make
-/// sure. Entries between dofs of different groups belong to no group; those of massless dofs are lost.
+/// Nonnegative shares of neighbors keep M positive definite on the dofs that keep mass. In all other cases (couplings
+/// of quadratic elements are negative, density may fall) the result is factorized once to check it. Entries between
+/// dofs of different groups belong to no group; those of massless dofs are lost.
 ///
-/// Nothing is stored in the rows and columns of massless dofs, nor zeros elsewhere: a diagonal result has a diagonal
-/// pattern.
+/// Rows and columns of massless dofs have no stored entries, and no zeros are stored elsewhere: a diagonal result has
+/// a diagonal pattern.
 ///
 /// # Errors
 ///
@@ -186,14 +187,14 @@ pub fn redistribute_consistent<T: Real>(
     Ok(result)
 }
 
-/// The motions 1, x, y, z of [`Redistribution::LeastSquares`]: one value a dof, coordinates from their mean, the same
-/// in each direction of a node.
+/// The motions 1, x, y, z of [`Redistribution::LeastSquares`]: one value per dof, coordinates relative to their mean,
+/// the same in each direction of a node.
 ///
-/// `coordinates` and `dofs` by node; `size` is the number of dofs of the system. Dofs of no node have zeros: they take
-/// no mass.
+/// `coordinates` and `dofs` are given by node; `size` is the number of dofs of the system. Dofs of no node get zeros:
+/// they receive no mass.
 ///
 /// A rigid motion moves direction x by a + ω_y z − ω_z y: for rigid motions alone the coordinates **across** a
-/// direction would do. All of them are kept so that nothing depends on the axes, and because it is no harder.
+/// direction would suffice. All of them are kept so that the result does not depend on the axes; this costs no more.
 ///
 /// # Errors
 ///
@@ -239,25 +240,25 @@ pub fn affine_motions<T: Real, const D: usize>(
     Ok(motions)
 }
 
-/// A mass matrix that is to lose the rows and columns of its massless dofs.
+/// A mass matrix before the rows and columns of its massless dofs are removed.
 struct Loss<'a> {
     groups: &'a [usize],
     massless: Vec<bool>,
     /// The diagonal of the matrix.
     mass: Vec<f64>,
-    /// Row, column and value of the entries that go and that stay, those between groups left out.
+    /// Row, column and value of the entries that are removed and kept, without entries between groups.
     lost: Vec<(usize, usize, f64)>,
     kept: Vec<(usize, usize, f64)>,
 }
 
-/// The change of the entries that are kept: Mᵢⱼ ← (Mᵢⱼ + δᵢⱼ addedᵢ)(1 + ½ densityᵢ + ½ densityⱼ).
+/// The change of the kept entries: Mᵢⱼ ← (Mᵢⱼ + δᵢⱼ addedᵢ)(1 + ½ densityᵢ + ½ densityⱼ).
 struct Change {
     added: Vec<f64>,
     density: Vec<f64>,
 }
 
 impl<'a> Loss<'a> {
-    /// With no entries yet.
+    /// Without entries.
     fn new<T: Real>(mass: &[T], massless: &[usize], groups: &'a [usize]) -> Result<Self> {
         let n = mass.len();
         if groups.len() != n {
@@ -279,7 +280,7 @@ impl<'a> Loss<'a> {
         (0..self.mass.len()).map(|dof| T::of(new(dof))).collect()
     }
 
-    /// Refuses masses that are not positive; zero is admitted on massless dofs.
+    /// Rejects masses that are not positive; zero is allowed on massless dofs.
     fn check<T: Real>(&self, mass: &[T]) -> Result<()> {
         let wrong = |(&m, &massless): (&T, &bool)| !((m > T::zero() || massless && m == T::zero()) && m.is_finite());
         match mass.iter().zip(&self.massless).position(wrong) {
@@ -288,10 +289,11 @@ impl<'a> Loss<'a> {
         }
     }
 
-    /// The change that gives the lost mass back; `epsilon` is that of the scalar of the input.
+    /// The change that returns the lost mass; `epsilon` is the rounding unit of the input scalar.
     fn returned(&self, by: Redistribution<'_>, epsilon: f64) -> Result<Change> {
         let n = self.mass.len();
-        // A row that only loses couplings gets them back on its diagonal; the sum of a massless row goes to other dofs.
+        // A row that keeps mass gets lost couplings back on its diagonal; the row sum of a massless dof goes to other
+        // dofs.
         let (mut change, mut given) = (Change { added: vec![0.0; n], density: vec![0.0; n] }, vec![0.0; n]);
         for &(row, _, value) in &self.lost {
             let sums = if self.massless[row] { &mut given } else { &mut change.added };
@@ -317,7 +319,7 @@ impl<'a> Loss<'a> {
                 let mut sums = change.added.clone();
                 self.kept.iter().for_each(|&(row, _, value)| sums[row] += value);
                 for dof in (0..n).filter(|&dof| self.massless[dof]) {
-                    // A neighbor of several massless dofs gives only once.
+                    // A neighbor of several massless dofs gives mass only once.
                     for other in self.neighbors(graph, dof) {
                         let part = fraction * std::mem::take(&mut sums[other]);
                         change.added[other] -= part;
@@ -338,7 +340,7 @@ impl<'a> Loss<'a> {
         Ok(change)
     }
 
-    /// The neighbors of a dof that are in its group and keep mass.
+    /// The neighbors of a dof in its group that keep mass.
     fn neighbors<'g>(
         &'g self,
         graph: SymbolicSparseColMatRef<'g, usize>,
@@ -348,7 +350,7 @@ impl<'a> Loss<'a> {
         graph.row_idx_of_col_raw(dof).iter().copied().filter(of_group)
     }
 
-    /// Gives the mass `given` away by massless dofs to all others of their groups, as density.
+    /// Distributes the mass `given` of massless dofs to all others of their groups, as density.
     fn spread(&self, given: &[f64], change: &mut Change) -> Result<()> {
         for group in self.by_group(|_| true) {
             let kept = group.kept.iter().map(|entry| entry.2).sum::<f64>();
@@ -360,7 +362,7 @@ impl<'a> Loss<'a> {
         Ok(())
     }
 
-    /// The groups that lose mass, with those of their dofs that keep mass and may `take` more.
+    /// The groups that lose mass, with their dofs that keep mass and may `take` more.
     fn by_group(&self, take: impl Fn(usize) -> bool) -> Vec<Group> {
         let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
         for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| self.massless[*dof]) {
@@ -384,12 +386,12 @@ impl<'a> Loss<'a> {
         groups.into_values().collect()
     }
 
-    /// Writes the density p of least Σ mᵢ pᵢ² that makes up for what ψᵀ M ψ′ has lost, for all pairs ψ, ψ′.
+    /// Writes the density p of least Σ mᵢ pᵢ² that compensates the loss of ψᵀ M ψ′ for all pairs ψ, ψ′.
     ///
-    /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) of the matrix B that is kept. With
-    /// the weights mᵢ the functions aᵢ/mᵢ are made orthonormal one after the other (Gram and Schmidt, twice), and the b
-    /// transformed alike; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits where coordinates start
-    /// far away.
+    /// The condition of a pair is Σ aᵢ pᵢ = b, with aᵢ = ½(ψᵢ (Bψ′)ᵢ + ψ′ᵢ (Bψ)ᵢ) and the kept matrix B. With the
+    /// weights mᵢ the functions aᵢ/mᵢ are orthonormalized one by one (Gram and Schmidt, twice), and the b are
+    /// transformed in the same way; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits if
+    /// coordinates start far away.
     fn least_squares(&self, group: &Group, motions: &[Vec<f64>], epsilon: f64, change: &mut Change) -> Result<()> {
         let tolerance = 1e3 * epsilon;
         let mass: Vec<f64> = group.receivers.iter().map(|&dof| self.mass[dof]).collect();
@@ -408,7 +410,7 @@ impl<'a> Loss<'a> {
                     group.receivers.iter().zip(&mass).map(|(dof, mass)| mean(dof) / mass).collect();
                 let (mut loss, mut size) = (0.0, 0.0);
                 for &(row, column, value) in &group.lost {
-                    // A coupling that is lost has come back to the diagonal of its row.
+                    // A lost coupling has been added to the diagonal of its row.
                     let back = if self.massless[row] { 0.0 } else { second[row] };
                     loss += value * first[row] * (second[column] - back);
                     size += (value * first[row]).abs() * (second[column].abs() + back.abs());
@@ -454,7 +456,7 @@ struct Group {
     kept: Vec<(usize, usize, f64)>,
 }
 
-/// Refuses a pattern of neighbors that does not belong to `size` dofs.
+/// Rejects a pattern of neighbors that does not have `size` dofs.
 fn check_graph(graph: SymbolicSparseColMatRef<'_, usize>, size: usize) -> Result<()> {
     for found in [graph.nrows(), graph.ncols()] {
         if found != size {
@@ -468,8 +470,7 @@ fn refused(dof: usize, reason: &'static str) -> Error {
     Error::Incompatible { part: format!("redistribution of the mass of dof {dof}"), reason }
 }
 
-/// Refuses to take the mass of a dof if no other may receive it; `weight` is the mass of the receivers, or their
-/// number.
+/// Fails if no dof may receive the mass of a dof; `weight` is the mass of the receivers, or their number.
 fn check_takers(dof: usize, weight: f64) -> Result<()> {
     match weight > 0.0 {
         true => Ok(()),

@@ -7,32 +7,32 @@ use crate::sparse;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 use std::collections::BTreeMap;
 
-/// A mass matrix assembled without some dofs, each element giving their mass to its other dofs (the elements at the
-/// contact boundary are treated apart as by Hager, Hüeber, Wohlmuth, Int. J. Numer. Methods Eng. 73, 2008, and Tkachuk,
-/// Wohlmuth, Bischoff, Int. J. Numer. Methods Eng. 94, 2013).
+/// A mass matrix assembled without some dofs: each element moves their mass to its other dofs. Hager, Hüeber,
+/// Wohlmuth (Int. J. Numer. Methods Eng. 73, 2008) and Tkachuk, Wohlmuth, Bischoff (Int. J. Numer. Methods Eng. 94,
+/// 2013) also treat the elements at the contact boundary separately.
 ///
-/// `elements` are pairs of dofs and the row-major element matrix, consistent, lumped or blended. An element that
-/// touches listed dofs (`massless`, in any order) loses their rows and columns; what is left is scaled by one factor
-/// for each group, so that the element keeps the total of each. `groups` gives every dof of the system a number as in
-/// [`lump_diagonal`](super::lump_diagonal); entries between groups take the geometric mean of both factors. Elements
-/// without such dofs are assembled as they are.
+/// `elements` are pairs of dofs and the row-major element matrix, consistent, lumped or blended. An element with
+/// listed dofs (`massless`, in any order) loses their rows and columns; the rest is scaled by one factor for each
+/// group, so that the element keeps the total of each. `groups` gives every dof of the system a number as in
+/// [`lump_diagonal`](super::lump_diagonal); entries between groups use the geometric mean of both factors. Elements
+/// without such dofs are assembled unchanged.
 ///
-/// Beside [`redistribute_consistent`](super::redistribute_consistent) with neighbors this needs the elements, and the
-/// mass of an element stays in it. Centers of mass move inward by the order of h_e². In a bar of equal linear elements
-/// both agree.
+/// Compared with [`redistribute_consistent`](super::redistribute_consistent) with neighbors, this needs the elements,
+/// and mass stays within its element. Centers of mass move inward by the order of h_e². In a bar of equal linear
+/// elements both agree.
 ///
-/// Positive semidefinite if the element matrices are, with exactly the listed dofs massless: nothing is stored in their
-/// rows and columns. Zeros are not stored either, so that lumped elements give a diagonal pattern.
+/// The result is positive semidefinite if the element matrices are, with exactly the listed dofs massless: their rows
+/// and columns have no stored entries. Zeros are not stored either, so lumped elements give a diagonal pattern.
 ///
-/// An element all of whose dofs of a group are listed, such as a triangle in a corner of the boundary, cannot keep its
-/// mass and is refused: list fewer dofs there, or redistribute.
+/// If all dofs of a group in an element are listed, as in a triangle in a corner of the boundary, the element cannot
+/// keep its mass, which is an error: list fewer dofs there, or use redistribution.
 ///
 /// # Errors
 ///
-/// [`Error::MissingDof`] for dofs that have no group, [`Error::Dimension`] for an element matrix of another size than
-/// its dofs, [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] (row and column are dofs of the system);
-/// [`Error::Incompatible`] with the number of an element that cannot keep its mass; [`Error::Mass`] if a dof that is
-/// not listed has none.
+/// [`Error::MissingDof`] for dofs that have no group, [`Error::Dimension`] for an element matrix whose size differs
+/// from its number of dofs, [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] (row and column are dofs of the
+/// system); [`Error::Incompatible`] with the number of an element that cannot keep its mass; [`Error::Mass`] if an
+/// unlisted dof has no mass.
 ///
 /// ```
 /// use contact_dynamics::mass;
@@ -62,7 +62,7 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
         if let Some((row, column, m)) = all().find(|(_, _, m)| !m.is_finite()) {
             return Err(Error::MatrixNotFinite { matrix: "element mass", row, column, value: m.value() });
         }
-        // Total of each group, and that of the dofs that keep mass.
+        // Total of each group, and total of its dofs that keep mass.
         let mut sums: BTreeMap<usize, [T; 2]> = BTreeMap::new();
         if dofs.iter().any(|&dof| massless[dof]) {
             for (row, column, m) in all().filter(|&(row, column, _)| groups[row] == groups[column]) {
@@ -100,25 +100,25 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
     Ok(mass)
 }
 
-/// The mass matrix M = Cᵀ D⁻¹ C of a mixed formulation with velocities in a space of their own, discontinuous from
-/// element to element (Renard, J. Comput. Appl. Math. 234, 2010; Tkachuk, Wohlmuth, Bischoff 2013).
+/// The mass matrix M = Cᵀ D⁻¹ C of a mixed formulation with a separate velocity space, discontinuous between elements
+/// (Renard, J. Comput. Appl. Math. 234, 2010; Tkachuk, Wohlmuth, Bischoff 2013).
 ///
 /// With the density ρ, velocity functions ψ_e and displacement functions φ_i: row e of `coupling` (velocity space ×
 /// displacement space) is C_ei = ∫ ρ ψ_e φ_i, and `velocity_mass` the diagonal D_e = ∫ ρ ψ_e². The velocities are then
 /// D⁻¹ C u̇, and ½ u̇ᵀ M u̇ is their kinetic energy.
 ///
-/// M is symmetric and positive semidefinite, and singular wherever C is: its null space is that of C. A dof whose
-/// column of C is empty has no mass: leave contact dofs out of the velocities. If C maps a uniform unit velocity to D 1
-/// (velocities take up constants exactly) the total mass is Σ D_e.
+/// M is symmetric and positive semidefinite, and has the null space of C. A dof whose column of C is empty has no
+/// mass: leave contact dofs out of the velocities. If C maps a uniform unit velocity to D 1 (velocities represent
+/// constants exactly), the total mass is Σ D_e.
 ///
-/// Every other motion must have a velocity in C: piecewise constant velocities on plain linear elements miss the
-/// alternating one, so that there a motion of the whole body has no mass (known failure, which this function does not
-/// detect).
+/// Every other motion must have a velocity in C. Known failure, which this function does not detect: piecewise
+/// constant velocities on linear elements miss the alternating motion, so that a motion of the whole body has no
+/// mass.
 ///
 /// # Errors
 ///
-/// [`Error::Dimension`] unless there is one velocity mass for each row, [`Error::Mass`] for one that is not positive
-/// (its `dof` is the row), [`Error::MatrixNotFinite`] for the coupling, and for the product if it overflows.
+/// [`Error::Dimension`] unless there is one velocity mass per row, [`Error::Mass`] for one that is not positive (its
+/// `dof` is the row), [`Error::MatrixNotFinite`] for the coupling, and for the product if it overflows.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

@@ -1,4 +1,4 @@
-//! Bodies side by side in one system.
+//! Several bodies in one system.
 
 use super::body::ReducedBody;
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use crate::system::LinearSystem;
 use faer::sparse::SparseColMatRef;
 use std::ops::Range;
 
-/// Bodies, reduced or not, side by side in one [`LinearSystem`]: block-diagonal matrices, one body after the other.
+/// Bodies, reduced or not, in one [`LinearSystem`]: block-diagonal matrices, one body after the other.
 ///
 /// ```
 /// use contact_dynamics::System;
@@ -40,7 +40,7 @@ pub struct Blocks<T> {
     mass: Vec<(usize, usize, T)>,
     stiffness: Vec<(usize, usize, T)>,
     damping: Vec<(usize, usize, T)>,
-    /// The constant load of all bodies; none if no body has one.
+    /// The constant load of all bodies; `None` if no body has one.
     load: Option<Vec<T>>,
 }
 
@@ -55,13 +55,12 @@ impl<T: Real> Blocks<T> {
         self.dofs
     }
 
-    /// Appends a body with mass, stiffness and damping matrices (both triangles stored), and returns where its dofs
-    /// stand.
+    /// Appends a body with mass, stiffness and damping matrices (both triangles stored), and returns the range of its
+    /// dofs.
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] unless all are square and of one size; what the entries must be
-    /// [`system`](Self::system) checks.
+    /// [`Error::Dimension`] unless all are square and of one size; [`system`](Self::system) checks the entries.
     pub fn body(
         &mut self,
         mass: SparseColMatRef<'_, usize, T>,
@@ -90,12 +89,12 @@ impl<T: Real> Blocks<T> {
         Ok(place)
     }
 
-    /// Appends a reduced body with its constant load, and returns where its dofs stand: the contact dofs are the last
-    /// of them.
+    /// Appends a reduced body with its constant load, and returns the range of its dofs; the contact dofs are the
+    /// last.
     ///
     /// # Errors
     ///
-    /// None of a body that was built; the signature is that of [`body`](Self::body).
+    /// None for a body that was built; the signature matches [`body`](Self::body).
     pub fn reduced(&mut self, body: &ReducedBody<T>) -> Result<Range<usize>> {
         let place = self.body(body.mass(), body.stiffness(), body.damping())?;
         if let Some(load) = body.constant_load() {
@@ -104,11 +103,11 @@ impl<T: Real> Blocks<T> {
         Ok(place)
     }
 
-    /// Adds to the constant load, from dof `first` on.
+    /// Adds to the constant load, starting at dof `first`.
     ///
     /// # Errors
     ///
-    /// [`Error::Dimension`] for a load that reaches beyond the dofs so far.
+    /// [`Error::Dimension`] for a load that extends beyond the present dofs.
     pub fn add_load(&mut self, first: usize, load: &[T]) -> Result<()> {
         let end = first.saturating_add(load.len());
         if end > self.dofs {
@@ -120,12 +119,12 @@ impl<T: Real> Blocks<T> {
         Ok(())
     }
 
-    /// The system of all bodies, with their constant load. Supports are added to it, and a load that changes in time
+    /// The system of all bodies, with their constant load. Supports can be added to it; a time-dependent load
     /// replaces the constant one.
     ///
     /// # Errors
     ///
-    /// Those of [`LinearSystem::new`] and [`LinearSystem::damping`].
+    /// The errors of [`LinearSystem::new`] and [`LinearSystem::damping`].
     pub fn system(&self) -> Result<LinearSystem<'static, T>> {
         let matrix = |entries: &[(usize, usize, T)]| assembled(self.dofs, entries.to_vec());
         let system = LinearSystem::new(matrix(&self.mass)?, matrix(&self.stiffness)?)?;
@@ -140,7 +139,7 @@ impl<T: Real> Blocks<T> {
     }
 }
 
-/// The entries of a matrix, from row and column `first` on.
+/// Appends the entries of a matrix, shifted to row and column `first`.
 fn append<T: Real>(first: usize, a: SparseColMatRef<'_, usize, T>, out: &mut Vec<(usize, usize, T)>) {
     for column in 0..a.ncols() {
         let entries = a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column));

@@ -1,4 +1,4 @@
-//! A reduced body: its matrices over (η, u_b), and the way from fields of the parent and back.
+//! A reduced body: its matrices over (η, u_b), and the maps from fields of the parent and back.
 
 use super::builder::{Accuracy, Boundary};
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use crate::system::LinearSystem;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 use std::ops::Range;
 
-/// What a reduced body is made of.
+/// The data of a reduced body.
 pub(super) struct Parts<'a, T: Real> {
     pub(super) contact: Vec<usize>,
     pub(super) fixed: Vec<usize>,
@@ -22,31 +22,31 @@ pub(super) struct Parts<'a, T: Real> {
     /// Φ and S on all dofs of the parent, column by column.
     pub(super) shapes: Vec<f64>,
     pub(super) fields: Vec<f64>,
-    /// F⁻¹; none where contact dofs have mass.
+    /// F⁻¹; empty if contact dofs have mass.
     pub(super) weights: Vec<f64>,
     pub(super) accuracy: Accuracy,
-    /// Coefficients of the modes; none without damping.
+    /// Coefficients of the modes; empty without damping.
     pub(super) damping: Vec<f64>,
     /// Rayleigh's coefficients, for contact dofs with mass.
     pub(super) rayleigh: Option<[f64; 2]>,
     pub(super) load: Option<Vec<T>>,
-    /// The static response to the load that the rest leaves; none without load.
+    /// The static response to the load that modes and contact dofs do not contain; empty without load.
     pub(super) rest: Vec<f64>,
     pub(super) mass: SparseColMatRef<'a, usize, T>,
     pub(super) stiffness: SparseColMatRef<'a, usize, T>,
     pub(super) factorizations: usize,
 }
 
-/// A body reduced to normal modes η and contact dofs u_b, made by [`Reduction`](super::Reduction).
+/// A body reduced to normal modes η and contact dofs u_b, built by [`Reduction`](super::Reduction).
 ///
 /// Its dofs are the modal coordinates, rigid motions first (unit: length · √mass), then the contact dofs in the order
-/// in which they were named (the parent's own displacements). [`system`](Self::system) has mass, stiffness, damping and
-/// constant load; several bodies, reduced or not, go into one system by [`Blocks`](super::Blocks).
+/// in which they were given (the parent's displacements). [`system`](Self::system) has mass, stiffness, damping and
+/// constant load; [`Blocks`](super::Blocks) combines several bodies, reduced or not, in one system.
 ///
-/// Fields of the parent are Φ Σ η + S F⁻¹ (u_b − P η), so that a recovered field has u_b at the contact dofs exactly.
-/// Loads go the opposite way, by the transpose: what is done to the parent at a contact dof is done to u_b alone.
-/// States are projected by Σ Φᵀ M: rigid motions exactly, with all momenta, and a state of static rest under a load to
-/// one of rest. Elastic vibrations are tapered once where they are read and once where they are excited.
+/// Fields of the parent are Φ Σ η + S F⁻¹ (u_b − P η), so a recovered field has exactly u_b at the contact dofs.
+/// Loads are mapped by the transpose: a load on a contact dof of the parent becomes a load on u_b only. States are
+/// projected by Σ Φᵀ M: rigid motions exactly, with all momenta, and a state of static rest under a load to a state
+/// of rest. Elastic vibrations are tapered once in recovery and once in excitation.
 #[derive(Clone, Debug)]
 pub struct ReducedBody<T: Real> {
     parent: usize,
@@ -59,7 +59,7 @@ pub struct ReducedBody<T: Real> {
     sigma: Vec<T>,
     shapes: Vec<T>,
     fields: Vec<T>,
-    /// F⁻¹ row by row, P contact dof by contact dof.
+    /// F⁻¹ row by row, P by contact dof.
     pub(super) weights: Vec<T>,
     pub(super) coupling: Vec<T>,
     mass: SparseColMat<usize, T>,
@@ -69,7 +69,7 @@ pub struct ReducedBody<T: Real> {
     rest: Vec<T>,
     parent_mass: SparseColMat<usize, T>,
     parent_load: Option<Vec<T>>,
-    /// For each fixed dof its column of the parent's K.
+    /// The parent's column of K for each fixed dof.
     at_supports: Vec<Vec<(usize, T)>>,
     accuracy: Accuracy,
     factorizations: usize,
@@ -82,7 +82,7 @@ fn check<T>(what: &'static str, x: &[T], expected: usize) -> Result<()> {
     }
 }
 
-/// A dense symmetric matrix in the making.
+/// A dense symmetric matrix under construction.
 struct Dense {
     size: usize,
     values: Vec<f64>,
@@ -98,7 +98,7 @@ impl Dense {
         self.values[j * self.size + i] = value;
     }
 
-    /// With entries that are zero left out.
+    /// Converts to sparse without zero entries.
     fn sparse<T: Real>(&self) -> Result<SparseColMat<usize, T>> {
         let size = self.size;
         let entries = self.values.iter().enumerate().filter(|(_, value)| **value != 0.0);
@@ -121,7 +121,7 @@ impl<T: Real> ReducedBody<T> {
         let parent = parts.stiffness.nrows();
         let (count, contacts) = (parts.frequencies.len(), parts.contact.len());
         let held = parts.boundary == Boundary::CraigBampton;
-        // P, contact dof by contact dof.
+        // P, one row per contact dof.
         let mut coupling = vec![0.0; contacts * count];
         if !held {
             for (row, &dof) in coupling.chunks_exact_mut(count).zip(&parts.contact) {
@@ -171,12 +171,12 @@ impl<T: Real> ReducedBody<T> {
         self.frequencies.len() + self.contact.len()
     }
 
-    /// Number of dofs of the parent, supports included.
+    /// Number of dofs of the parent, including supports.
     pub fn parent_dofs(&self) -> usize {
         self.parent
     }
 
-    /// Where the contact dofs stand, in the order in which they were named.
+    /// Range of the contact dofs, in the order in which they were given.
     pub fn contact_dofs(&self) -> Range<usize> {
         self.frequencies.len()..self.dofs()
     }
@@ -191,17 +191,17 @@ impl<T: Real> ReducedBody<T> {
         &self.frequencies
     }
 
-    /// How far it is from its parent, as far as the build can tell.
+    /// Distance from the parent, as far as the build can determine it.
     pub fn accuracy(&self) -> Accuracy {
         self.accuracy
     }
 
-    /// Sparse factorizations that the build took.
+    /// Number of sparse factorizations during the build.
     pub fn factorizations(&self) -> usize {
         self.factorizations
     }
 
-    /// The mass matrix: diag(I, 0), or that of Craig and Bampton.
+    /// The mass matrix: diag(I, 0), or the one of Craig and Bampton.
     pub fn mass(&self) -> SparseColMatRef<'_, usize, T> {
         self.mass.as_ref()
     }
@@ -225,7 +225,7 @@ impl<T: Real> ReducedBody<T> {
     ///
     /// # Errors
     ///
-    /// Those of [`LinearSystem::new`].
+    /// The errors of [`LinearSystem::new`].
     pub fn system(&self) -> Result<LinearSystem<'static, T>> {
         let system = LinearSystem::new(self.mass.clone(), self.stiffness.clone())?;
         let system = match &self.damping {
@@ -238,7 +238,7 @@ impl<T: Real> ReducedBody<T> {
         })
     }
 
-    /// A load on the dofs of the parent (forces; those on supports are dropped) as one on the reduced dofs.
+    /// Converts a load on the dofs of the parent (forces; those on supports are dropped) to one on the reduced dofs.
     ///
     /// # Errors
     ///
@@ -248,7 +248,7 @@ impl<T: Real> ReducedBody<T> {
         let count = self.frequencies.len();
         let mut out = self.along(&self.shapes, load);
         let moved = self.along(&self.fields, load);
-        // (Craig and Bampton's fields are those of displacements.)
+        // For Craig and Bampton the fields are responses to displacements.
         let forces = self.weigh(&moved);
         for (x, &sigma) in out.iter_mut().zip(&self.sigma) {
             *x *= sigma;
@@ -262,7 +262,7 @@ impl<T: Real> ReducedBody<T> {
         Ok(out)
     }
 
-    /// A displacement of the parent as one of the reduced dofs.
+    /// Converts a displacement of the parent to the reduced dofs.
     ///
     /// # Errors
     ///
@@ -272,7 +272,7 @@ impl<T: Real> ReducedBody<T> {
         Ok(self.project(u))
     }
 
-    /// A velocity of the parent as one of the reduced dofs.
+    /// Converts a velocity of the parent to the reduced dofs.
     ///
     /// # Errors
     ///
@@ -298,7 +298,7 @@ impl<T: Real> ReducedBody<T> {
         out
     }
 
-    /// The displacement of the parent, zero at supports: with the static response to the constant load.
+    /// The displacement of the parent, zero at supports, including the static response to the constant load.
     ///
     /// # Errors
     ///
@@ -312,7 +312,7 @@ impl<T: Real> ReducedBody<T> {
         Ok(field)
     }
 
-    /// The velocity of the parent; accelerations are recovered alike.
+    /// The velocity of the parent; accelerations are recovered in the same way.
     ///
     /// # Errors
     ///
@@ -341,13 +341,13 @@ impl<T: Real> ReducedBody<T> {
         Ok(field)
     }
 
-    /// What rounding has left of them.
+    /// Sets the contact dofs exactly, which recovery reproduces only to rounding.
     fn set_contact(&self, x: &[T], field: &mut [T]) {
         self.contact.iter().zip(&x[self.frequencies.len()..]).for_each(|(&dof, &u)| field[dof] = u);
     }
 
     /// The forces of the supports on the body, one for each fixed dof in the order in which they were given, from
-    /// displacements and accelerations of the reduced dofs: what M a + K u − f has there. Damping forces are left out.
+    /// displacements and accelerations of the reduced dofs: M a + K u − f at these dofs. Damping forces are left out.
     ///
     /// # Errors
     ///
@@ -369,7 +369,7 @@ impl<T: Real> ReducedBody<T> {
         columns.chunks_exact(self.parent).map(|column| crate::dense::dot(column, x)).collect()
     }
 
-    /// F⁻¹ x; x itself where contact dofs have mass.
+    /// F⁻¹ x; x itself if contact dofs have mass.
     fn weigh(&self, x: &[T]) -> Vec<T> {
         match self.weights.is_empty() {
             true => x.to_vec(),
@@ -382,7 +382,7 @@ impl<T: Real> ReducedBody<T> {
 fn massless<T: Real>(parts: &Parts<'_, T>, coupling: &[f64]) -> Result<[Dense; 2]> {
     let (count, contacts) = (parts.frequencies.len(), parts.contact.len());
     let (mut mass, mut stiffness) = (Dense::new(count + contacts)?, Dense::new(count + contacts)?);
-    // Rows of P are columns of Pᵀ (modes × contact dofs); W P in the same way.
+    // Rows of P are columns of Pᵀ (modes × contact dofs); the same holds for W P.
     let mut weighed = vec![0.0; count * contacts];
     add_product(1.0, count, coupling, &parts.weights, &mut weighed);
     let mut pulled = vec![0.0; count * count];
@@ -407,7 +407,7 @@ fn massless<T: Real>(parts: &Parts<'_, T>, coupling: &[f64]) -> Result<[Dense; 2
     Ok([mass, stiffness])
 }
 
-/// M and K projected onto modes with the contact dofs held and static responses to these.
+/// M and K projected onto the modes with held contact dofs and the static responses to these dofs.
 fn with_mass<T: Real>(parts: &Parts<'_, T>) -> Result<[Dense; 2]> {
     let (count, contacts, n) = (parts.frequencies.len(), parts.contact.len(), parts.stiffness.nrows());
     let (mut mass, mut stiffness) = (Dense::new(count + contacts)?, Dense::new(count + contacts)?);
@@ -441,7 +441,7 @@ fn with_mass<T: Real>(parts: &Parts<'_, T>) -> Result<[Dense; 2]> {
     Ok([mass, stiffness])
 }
 
-/// C: that of the modes, or of all dofs if contact dofs have mass and damping is Rayleigh's.
+/// C: the modal damping, or Rayleigh damping of all dofs if contact dofs have mass.
 fn damping<T: Real>(parts: &Parts<'_, T>, [mass, stiffness]: [&Dense; 2]) -> Result<SparseColMat<usize, T>> {
     let mut matrix = Dense::new(mass.size)?;
     if let (Boundary::CraigBampton, Some([of_mass, of_stiffness])) = (parts.boundary, parts.rayleigh) {

@@ -1,4 +1,4 @@
-//! How a body is reduced: supports, contact dofs, the treatment of what the modes leave, damping, constant loads.
+//! Builder of a reduced body: supports, contact dofs, residual flexibility, damping, constant loads.
 
 use super::body::{Parts, ReducedBody};
 use super::modes::{Modes, Wanted};
@@ -11,52 +11,54 @@ use crate::real::Real;
 use crate::sparse;
 use faer::sparse::SparseColMatRef;
 
-/// What stands between the modes and the contact dofs.
+/// The interface between modes and contact dofs.
 ///
-/// `docs/reduction.md` measures all of them.
+/// `docs/reduction.md` measures all variants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Boundary {
-    /// Massless contact dofs on the residual flexibility, the modes tapered toward the highest: the contact force is
-    /// smooth. Statically a little softer than the body: see [`Accuracy`]. For parents with a plain mass matrix: where
-    /// contact dofs of the parent have no mass already, or contacts are small and grow slowly, it is too soft.
+    /// Massless contact dofs on the residual flexibility, with the modes tapered toward the highest: the contact
+    /// force is smooth. Statically slightly softer than the body; see [`Accuracy`]. For parents with a regular mass
+    /// matrix. It is too soft if contact dofs of the parent are already massless, or if contacts are small and grow
+    /// slowly.
     #[default]
     Tapered,
     /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
     /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
-    /// exact. Known failure: the abrupt end of the modes rings in the contact force, after a front by 0.8 of it; not
-    /// where contacts grow slowly, as Hertz's do, nor where contact dofs of the parent have no mass and the modes are
-    /// many times as many as these.
+    /// exact. Known failure: the abrupt end of the modes makes the contact force ring, after a front by 0.8 of it. It
+    /// does not ring if contacts grow slowly, as Hertz's do, or if contact dofs of the parent have no mass and there
+    /// are many times more modes than contact dofs.
     Untapered,
-    /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6, 1968).
-    /// Statically exact; contact dofs have mass. Known failure: that mass is struck, and the force rings and jumps as
-    /// with any scheme on dofs with mass; take it with a corrector.
+    /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6,
+    /// 1968). Statically exact; contact dofs have mass. Known failure: at an impact that mass makes the force ring
+    /// and jump, as with any scheme on dofs with mass; use a corrector.
     CraigBampton,
 }
 
-/// How far a reduced body is from its parent, as far as the build can tell.
+/// Distance of a reduced body from its parent, as far as the build can determine it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Accuracy {
-    /// The share of the static compliance at a contact dof, without rigid motion, that is not in the modes: the largest
-    /// of all contact dofs. None for [`Boundary::CraigBampton`], whose modes do not see the contact dofs.
+    /// The share of the static compliance at a contact dof, without rigid motion, that the modes do not contain: the
+    /// largest over all contact dofs. `None` for [`Boundary::CraigBampton`], whose modes do not move the contact
+    /// dofs.
     pub residual: Option<f64>,
-    /// By how much, relatively, that compliance is larger than the parent's: [`Reduction::softening`] times the
-    /// residual if tapered, else zero.
+    /// Relative excess of that compliance over the parent's: [`Reduction::softening`] times the residual if tapered,
+    /// otherwise zero.
     pub compliance: f64,
-    /// The first circular frequency that is not in the modes (1/time). A contact that lasts T has its force resolved to
-    /// times of about 1/ω: mean errors were found to be about 2/(ω T) where bodies touch at a point.
+    /// The first circular frequency not in the modes (1/time). The force of a contact of duration T is resolved to
+    /// times of about 1/ω: observed mean errors were about 2/(ω T) for bodies that touch at a point.
     pub cutoff: f64,
-    /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω: with longer ones the overshoot of
-    /// the force behind a front was found to grow, and its error is that of the step, not of the modes. Infinite for a
-    /// body that is rigid.
+    /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω. With longer steps the observed
+    /// overshoot of the force behind a front grew, and its error was that of the step, not of the modes. Infinite for
+    /// a rigid body.
     pub longest_step: f64,
 }
 
-/// ω h up to which steps resolve a mode.
+/// Largest ω h at which steps resolve a mode.
 const RESOLVED: f64 = 2.5;
 
-/// The softening that has the least error behind a front.
+/// The softening with the least error behind a front.
 const SOFTENING: f64 = 2.0;
 
 /// The longest step for modes with this cutoff.
@@ -71,11 +73,11 @@ enum Damping<'a> {
     Rayleigh([f64; 2]),
 }
 
-/// Reduces a body to normal modes η and its contact dofs u_b, as a builder.
+/// Reduces a body to normal modes η and its contact dofs u_b.
 ///
-/// The body is given by M and K as a [`LinearSystem`](crate::LinearSystem) takes them, with or without supports, and
-/// by the dofs that contact acts on: normal ones, and tangential ones if there is friction. With the modes φ_k, ω_k and
-/// weights σ_k² = 1 − (ω_k/ω_c)³, ω_c the first frequency left out,
+/// The body is given by M and K as for a [`LinearSystem`](crate::LinearSystem), with or without supports, and by the
+/// dofs on which contact acts: normal dofs, and tangential ones for friction. With the modes φ_k, ω_k and weights
+/// σ_k² = 1 − (ω_k/ω_c)³, where ω_c is the first frequency left out,
 ///
 /// ```math
 /// \begin{aligned}
@@ -86,10 +88,9 @@ enum Damping<'a> {
 /// \end{aligned}
 /// ```
 ///
-/// (of 3 R one R is what statics ask for, the others are [`softening`](Self::softening)). Over (η, u_b) this has
-/// M = diag(I, 0) and a stiffness made of Ω², P and F⁻¹. The contact dofs have no mass: take
-/// schemes for [dofs without mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and
-/// no corrector.
+/// (of 3 R, statics need one R, the others are [`softening`](Self::softening)). Over (η, u_b) this has M = diag(I, 0)
+/// and a stiffness built from Ω², P and F⁻¹. The contact dofs have no mass: use schemes for [dofs without
+/// mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and no corrector.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -126,7 +127,7 @@ pub struct Reduction<'a, T: Real> {
     fixed: Vec<usize>,
     boundary: Boundary,
     exponent: f64,
-    /// None until chosen.
+    /// `None` until chosen.
     softening: Option<f64>,
     damping: Damping<'a>,
     load: Option<Vec<T>>,
@@ -139,12 +140,12 @@ impl<T: Real> std::fmt::Debug for Reduction<'_, T> {
     }
 }
 
-/// What the modes leave at the contact dofs, in `f64`: fields on the free dofs.
+/// The interface at the contact dofs, in `f64`: fields on the free dofs.
 struct Interface {
     /// Weights σ_k of the modes.
     sigma: Vec<f64>,
-    /// Static responses S to forces at the contact dofs that go along with the modes' ones (to displacements, for
-    /// [`Boundary::CraigBampton`]), column by column.
+    /// Static responses S to forces at the contact dofs, in addition to those of the modes (responses to
+    /// displacements for [`Boundary::CraigBampton`]), column by column.
     fields: Vec<f64>,
     /// F⁻¹, row by row; the stiffness of the contact dofs.
     stiffness: Vec<f64>,
@@ -152,8 +153,8 @@ struct Interface {
 }
 
 impl<'a, T: Real> Reduction<'a, T> {
-    /// Of a body with mass M and stiffness K (both triangles stored), on which contact acts at the dofs `contact`, in
-    /// any order. Everything is checked when modes are asked for.
+    /// For a body with mass M and stiffness K (both triangles stored), with the contact dofs `contact` in any order.
+    /// The inputs are checked when modes are computed.
     pub fn new(
         mass: SparseColMatRef<'a, usize, T>,
         stiffness: SparseColMatRef<'a, usize, T>,
@@ -172,67 +173,67 @@ impl<'a, T: Real> Reduction<'a, T> {
         }
     }
 
-    /// Holds dofs at zero displacement; replaces supports given before.
+    /// Holds dofs at zero displacement; replaces earlier supports.
     #[must_use]
     pub fn fix(self, dofs: &[usize]) -> Self {
         Self { fixed: dofs.to_vec(), ..self }
     }
 
-    /// What stands between the modes and the contact dofs; default [`Boundary::Tapered`].
+    /// The interface between modes and contact dofs; default [`Boundary::Tapered`].
     #[must_use]
     pub fn boundary(self, boundary: Boundary) -> Self {
         Self { boundary, ..self }
     }
 
-    /// The exponent p of the taper σ² = 1 − (ω/ω_c)^p; default 3. The larger, the more modes count fully; 3 has
-    /// the least error behind a front (`docs/reduction.md`).
+    /// The exponent p of the taper σ² = 1 − (ω/ω_c)^p; default 3, which has the least error behind a front
+    /// (`docs/reduction.md`). With a larger p more modes count fully.
     #[must_use]
     pub fn exponent(self, exponent: f64) -> Self {
         Self { exponent, ..self }
     }
 
-    /// How many times the residual flexibility R is added to what is statically exact, if tapered; default 2, which
-    /// has the least error behind a front. With 0 statics are exact, as small contacts that grow slowly need it, and
-    /// behind a front the force overshoots by half of it (`docs/reduction.md`).
+    /// How many times the residual flexibility R is added to the statically exact flexibility, if tapered; default 2,
+    /// which has the least error behind a front. With 0 statics are exact, as needed for small contacts that grow
+    /// slowly, and behind a front the force overshoots by half of it (`docs/reduction.md`).
     ///
-    /// Where contact dofs of the parent have no mass nothing rings there, R is the flexibility of a layer of elements,
-    /// and the default is in the way: the build refuses a tapered body then, unless a softening has been chosen.
+    /// If contact dofs of the parent have no mass, the force does not ring and R is the flexibility of a layer of
+    /// elements. The default would only soften the body, so the build rejects a tapered body then unless a softening
+    /// was chosen.
     #[must_use]
     pub fn softening(self, times: f64) -> Self {
         Self { softening: Some(times), ..self }
     }
 
-    /// Damping of the modes by a share of the critical one, given for each circular frequency; replaces damping given
-    /// before. Rigid motions are not damped, nor what follows statically.
+    /// Damping ratio of the modes as a function of circular frequency; replaces earlier damping. Rigid motions and
+    /// the static response are not damped.
     #[must_use]
     pub fn damping_ratio(self, ratio: impl Fn(f64) -> f64 + 'a) -> Self {
         Self { damping: Damping::Ratio(Box::new(ratio)), ..self }
     }
 
-    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s), of the modes alone; replaces damping given
-    /// before.
+    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s), of the modes only; replaces earlier damping.
     #[must_use]
     pub fn rayleigh(self, mass: f64, stiffness: f64) -> Self {
         Self { damping: Damping::Rayleigh([mass, stiffness]), ..self }
     }
 
-    /// A load that does not change, such as weight: one entry for each dof of the body. The system has it, and
-    /// recovered displacements the static response to it that the modes leave.
+    /// A constant load, such as weight: one entry for each dof of the body. The system has it, and recovered
+    /// displacements include the static response to it that the modes do not contain.
     #[must_use]
     pub fn constant_load(self, load: &[T]) -> Self {
         Self { load: Some(load.to_vec()), ..self }
     }
 
-    /// The body reduced to the `count` modes of least frequency, rigid motions included, and its contact dofs.
+    /// The body reduced to the `count` lowest modes, including rigid motions, and its contact dofs.
     ///
     /// # Errors
     ///
-    /// Those of [`Modes::lowest`]; for the contact dofs [`Error::Empty`], [`Error::MissingDof`],
-    /// [`Error::RepeatedDof`] and, if one is fixed, [`Error::Incompatible`]; [`Error::Incompatible`] too if the modes
-    /// leave no flexibility between them and some contact dofs, and for a tapered body whose parent has contact dofs
-    /// without mass unless a [`softening`](Self::softening) was chosen; [`Error::Dimension`] and [`Error::NotFinite`]
-    /// for the constant load, [`Error::Parameter`] for exponent and damping; [`Error::LinearNotConverged`] if a static
-    /// response is not found.
+    /// The errors of [`Modes::lowest`]; for the contact dofs [`Error::Empty`], [`Error::MissingDof`],
+    /// [`Error::RepeatedDof`] and, if one is fixed, [`Error::Incompatible`]. Also [`Error::Incompatible`] if the
+    /// modes leave no flexibility between them and some contact dofs, and for a tapered body whose parent has
+    /// massless contact dofs unless a [`softening`](Self::softening) was chosen; [`Error::Dimension`] and
+    /// [`Error::NotFinite`] for the constant load, [`Error::Parameter`] for exponent and damping;
+    /// [`Error::LinearNotConverged`] if a static response is not found.
     pub fn modes(&self, count: usize) -> Result<ReducedBody<T>> {
         self.build(&|pencil| Modes::find(pencil, Wanted::Count(count)))
     }
@@ -246,8 +247,8 @@ impl<'a, T: Real> Reduction<'a, T> {
         self.build(&|pencil| Modes::find(pencil, Wanted::UpTo(frequency)))
     }
 
-    /// The body reduced to modes that are known: with supports as here; for [`Boundary::CraigBampton`] with the contact
-    /// dofs held as well.
+    /// The body reduced to given modes, computed with the same supports, for [`Boundary::CraigBampton`] with the
+    /// contact dofs held too.
     ///
     /// # Errors
     ///
@@ -359,7 +360,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         }
     }
 
-    /// Massless contact dofs on what the modes leave of the flexibility.
+    /// Massless contact dofs on the residual flexibility of the modes.
     fn massless(&self, pencil: &mut Pencil, modes: &Modes) -> Result<Interface> {
         let (n, count, contacts) = (pencil.size(), modes.count(), self.contact.len());
         let places: Vec<usize> =
@@ -374,7 +375,7 @@ impl<'a, T: Real> Reduction<'a, T> {
             false => 1.0,
         };
         let squares: Vec<f64> = modes.frequencies.iter().map(|&omega| square(omega)).collect();
-        // Flexibility of each mode that the taper leaves to the contact dofs, and all of it.
+        // The part of each mode's flexibility that the taper moves to the contact dofs.
         let of_mode = |k: usize, share: f64| if k < modes.rigid() { 0.0 } else { share / modes.frequencies[k].powi(2) };
         let at = |k: usize, contact: usize| modes.shapes[k * n + places[contact]];
         let mut shares = vec![0.0; count * contacts];
@@ -400,7 +401,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         Ok(Interface { sigma: squares.into_iter().map(f64::sqrt).collect(), fields, stiffness, accuracy })
     }
 
-    /// Static responses to displacements of the contact dofs, beside modes with these held.
+    /// Static responses to displacements of the contact dofs, in addition to modes with held contact dofs.
     fn held(&self, pencil: &mut Pencil, modes: &Modes) -> Result<Interface> {
         let (n, count) = (pencil.size(), modes.count());
         let coupling = pencil::part(self.stiffness, &pencil.free, &self.contact)?;
@@ -447,7 +448,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         }
     }
 
-    /// The static response to the constant load that modes and contact dofs leave, zero at the contact dofs.
+    /// The static response to the constant load that modes and contact dofs do not contain, zero at the contact dofs.
     fn rest(&self, pencil: &mut Pencil, modes: &Modes, interface: &Interface) -> Result<Vec<f64>> {
         let n = pencil.size();
         let Some(load) = &self.load else { return Ok(Vec::new()) };
@@ -456,7 +457,7 @@ impl<'a, T: Real> Reduction<'a, T> {
         if self.boundary == Boundary::CraigBampton {
             return Ok(rest);
         }
-        // As if the load were one more contact force: S of the load, less what the contact dofs have of it.
+        // Treats the load as one more contact force: S of the load, minus the share of the contact dofs.
         if self.boundary == Boundary::Tapered {
             for x in &mut rest {
                 *x *= 1.0 + self.softening.unwrap_or(SOFTENING);
@@ -479,7 +480,7 @@ impl<'a, T: Real> Reduction<'a, T> {
     }
 }
 
-/// F⁻¹, symmetric bit for bit.
+/// F⁻¹, bitwise symmetric.
 fn inverse(size: usize, modes: usize, entry: impl Fn(usize, usize) -> f64) -> Result<Vec<f64>> {
     let mut factor = DenseCholesky::<f64>::default();
     if factor.factorize(size, entry).is_err() || factor.is_singular() {

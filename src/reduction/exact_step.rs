@@ -1,21 +1,23 @@
 //! The exact step of one mode whose force is linear in time (Nigam and Jennings, Bull. Seism. Soc. Am. 59, 1969).
 
-/// `η̈ + c η̇ + k η = f` with f linear over a step h: values at its end from those at its start, rows of η and η̇.
+/// `η̈ + c η̇ + k η = f` with f linear over a step h: the map from values at its start to those at its end, rows of η
+/// and η̇.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExactStep {
-    /// By η and η̇ at the start.
+    /// Coefficients of η and η̇ at the start.
     pub(super) motion: [[f64; 2]; 2],
-    /// By f at the start and at the end.
+    /// Coefficients of f at the start and at the end.
     pub(super) force: [[f64; 2]; 2],
 }
 
 /// The response to a unit impulse, its rate, and its first two integrals, over a time h; in units of h.
 ///
-/// (`kept` is `rate + damping · value`, but with strong damping not in digits.)
+/// `kept` equals `rate + damping · value`, but is computed separately because that sum loses digits with strong
+/// damping.
 #[derive(Clone, Copy, Debug)]
 struct Impulse {
     stiffness: f64,
-    /// What is left of a displacement.
+    /// Response to a unit initial displacement.
     kept: f64,
     rate: f64,
     value: f64,
@@ -23,12 +25,12 @@ struct Impulse {
     twice: f64,
 }
 
-/// From c h + k h² below this on, series converge within `TERMS`.
+/// Below this value of c h + k h² the series converge within `TERMS`.
 const SHORT: f64 = 0.5;
 const TERMS: u32 = 20;
 
 impl Impulse {
-    /// By their series about zero: derivatives of the response to an impulse follow from the equation of motion.
+    /// From the power series about zero: the equation of motion gives the derivatives of the impulse response.
     fn series(damping: f64, stiffness: f64) -> Self {
         let (mut last, mut derivative) = (0.0, 1.0);
         let mut sums = Self { stiffness, kept: 0.0, rate: 0.0, value: 0.0, once: 0.0, twice: 0.0 };
@@ -47,8 +49,8 @@ impl Impulse {
         sums
     }
 
-    /// Over twice the time: the second half starts from the state and the force that the first one ends with. In units
-    /// of the whole time.
+    /// Over twice the time, in units of the whole time: the second half starts from the state and the force at the
+    /// end of the first half.
     fn doubled(self) -> Self {
         let after = |[value, rate]: [f64; 2]| self.kept * value + self.value * rate;
         let elastic = self.stiffness * self.value * self.value;
@@ -64,7 +66,7 @@ impl Impulse {
 }
 
 impl ExactStep {
-    /// Of a mode with damping c (1/time) and the square k of its circular frequency, both not negative.
+    /// For a mode with damping c (1/time) and squared circular frequency k, both nonnegative.
     pub(super) fn new(damping: f64, stiffness: f64, h: f64) -> Self {
         let (mut c, mut k, mut doublings) = (damping * h, stiffness * h * h, 0);
         while c + k > SHORT {

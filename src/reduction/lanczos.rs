@@ -1,13 +1,13 @@
 //! Band Lanczos for (K + σM)⁻¹ M in the inner product of M, with full reorthogonalization.
 //!
-//! Ruhe's band form (Math. Comp. 33, 1979; SIAM J. Sci. Stat. Comput. 5, 1984, for the spectral transformation): a
-//! basis V, M-orthonormal, of which each vector is multiplied once and what is left of the product beside the basis
-//! appended to it. With as many vectors ahead as motions are rigid multiple eigenvalues come together; a product with
-//! nothing left shortens the band, and new random vectors lengthen it. Of Rayleigh and Ritz's pairs the residual is
-//! known without another product. The basis is not restarted: two to three vectors are kept for each mode.
+//! Ruhe's band form (Math. Comp. 33, 1979; SIAM J. Sci. Stat. Comput. 5, 1984, for the spectral transformation): each
+//! vector of an M-orthonormal basis V is multiplied once, and the part of the product orthogonal to the basis is
+//! appended. If the band is at least as wide as the number of rigid motions, multiple eigenvalues are found together.
+//! A product without a new part shortens the band, and new random vectors widen it. The residual of Rayleigh–Ritz
+//! pairs is known without another product. The basis is not restarted: two to three vectors are kept for each mode.
 //!
-//! Where M is singular vectors may gather parts of its null space, which no product with M sees: what is taken for a
-//! mode is multiplied once more.
+//! If M is singular, vectors may acquire components in its null space, which products with M do not detect: candidate
+//! modes are multiplied once more.
 
 use super::pencil::Pencil;
 use crate::dense::dot;
@@ -16,22 +16,22 @@ use crate::kernels::dense::{add_product, symmetric_eigen, transposed_product};
 use crate::memory;
 use crate::sparse::scattered_signed;
 
-/// What is left of a product beside the basis counts as nothing below this share.
+/// A new part of a product below this share counts as zero.
 const NOTHING: f64 = 1e-14;
 
-/// A vector that keeps this share of its length has lost nothing of its orthogonality.
+/// A vector that keeps this share of its length has lost no orthogonality.
 const ENOUGH: f64 = 0.7;
 
-/// One that keeps less than this share is computed anew.
+/// A vector that keeps less than this share is orthogonalized again.
 const SMALL: f64 = 0.1;
 
 /// Residual of a pair that counts as converged, over its eigenvalue of (K + σM)⁻¹ M.
 const CONVERGED: f64 = 1e-10;
 
-/// Eigenpairs that have converged without one missing between them, by ascending frequency.
+/// Converged eigenpairs without gaps, by ascending frequency.
 #[derive(Debug, Default)]
 pub(super) struct Pairs {
-    /// Eigenvalues of K − λM as Ritz's values say.
+    /// Eigenvalues of K − λM from the Ritz values.
     pub(super) values: Vec<f64>,
     /// Their vectors over the first `size` of the basis, column by column.
     vectors: Vec<f64>,
@@ -41,28 +41,28 @@ pub(super) struct Pairs {
 #[derive(Debug)]
 pub(super) struct Lanczos {
     n: usize,
-    /// Vectors found before, M-orthonormal, to which the basis is orthogonal, and how many there are.
+    /// Earlier M-orthonormal vectors, to which the basis is orthogonal, and the number of vectors in the basis.
     locked: Vec<f64>,
     basis: Vec<f64>,
     count: usize,
-    /// M times the vectors of the basis from the `kept`-th on: those of the band.
+    /// M times the vectors of the basis from the `kept`-th on: the vectors of the band.
     products: Vec<f64>,
     kept: usize,
-    /// How many vectors have been multiplied, and the coefficients of their products by the basis.
+    /// Number of multiplied vectors, and the coefficients of their products in the basis.
     done: usize,
     columns: Vec<Vec<f64>>,
     /// Number of random vectors so far.
     drawn: usize,
-    /// Memory for what is to be appended, and M times it.
+    /// Memory for vectors to be appended, and M times these.
     vectors: Vec<f64>,
     images: Vec<f64>,
     pub(super) block: usize,
-    /// No vector is left beside the basis.
+    /// No vector orthogonal to the basis is left.
     pub(super) exhausted: bool,
 }
 
 impl Lanczos {
-    /// With a band of `block`.
+    /// With a band of width `block`.
     pub(super) fn new(n: usize, block: usize, locked: Vec<f64>) -> Self {
         Self {
             n,
@@ -81,12 +81,12 @@ impl Lanczos {
         }
     }
 
-    /// Vectors in the basis.
+    /// Number of vectors in the basis.
     pub(super) fn count(&self) -> usize {
         self.count
     }
 
-    /// Appends random vectors, as many as the band is wide, in the range of (K + σM)⁻¹ M.
+    /// Appends random vectors in the range of (K + σM)⁻¹ M, as many as the band is wide.
     pub(super) fn draw(&mut self, pencil: &mut Pencil) -> Result<()> {
         let n = self.n;
         let numbers: Vec<f64> = (0..n * self.block).map(|k| scattered_signed(self.drawn * n + k)).collect();
@@ -100,7 +100,7 @@ impl Lanczos {
         Ok(())
     }
 
-    /// Multiplies the vectors ahead.
+    /// Multiplies the vectors of the band.
     pub(super) fn advance(&mut self, pencil: &mut Pencil) -> Result<()> {
         if self.done == self.count {
             self.draw(pencil)?;
@@ -114,7 +114,7 @@ impl Lanczos {
         vectors.clear();
         vectors.extend_from_slice(&self.products[(ahead.start - self.kept) * n..(ahead.end - self.kept) * n]);
         pencil.solve(&mut vectors)?;
-        // (But for rounding these have parts of the last vectors of the basis only.)
+        // Up to rounding, these have components in the last vectors of the basis only.
         let columns = self.append(pencil, &mut vectors, ahead.start.saturating_sub(2 * self.block))?;
         self.columns.extend(columns);
         self.vectors = vectors;
@@ -125,8 +125,8 @@ impl Lanczos {
         Ok(())
     }
 
-    /// Takes what vectors have of the basis, returns the coefficients, and appends what is left, normalized. Most of
-    /// what they have is of the basis from `recent` on.
+    /// Removes the components of vectors in the basis, returns their coefficients, and appends the normalized
+    /// remainders. The largest components are in the basis from `recent` on.
     fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64], recent: usize) -> Result<Vec<Vec<f64>>> {
         let n = self.n;
         let width = vectors.len() / n;
@@ -137,7 +137,8 @@ impl Lanczos {
         let before: Vec<f64> = norms(n, vectors, &products);
         let mut columns = vec![vec![0.0; self.count]; width];
         self.clear_recent(pencil, recent, [vectors, &mut products], &mut columns);
-        // Once is enough where little is taken, twice elsewhere (Kahan; Giraud, Langou, Rozložník, van den Eshof 2005).
+        // Once is enough if little is removed, otherwise twice (Kahan; Giraud, Langou, Rozložník, van den Eshof
+        // 2005).
         let mut lengths = norms(n, vectors, &products);
         for _ in 0..3 {
             remove(n, &self.locked, &products, vectors);
@@ -157,7 +158,7 @@ impl Lanczos {
         Ok(columns)
     }
 
-    /// Takes what vectors have of the basis from `recent` on, and keeps their products with M up to date.
+    /// Removes components in the basis from `recent` on, and updates the products with M.
     fn clear_recent(
         &self,
         pencil: &mut Pencil,
@@ -174,16 +175,16 @@ impl Lanczos {
         let coefficients = remove(n, &self.basis[recent * n..], products, vectors);
         add_product(-1.0, n, &self.products[(recent - self.kept) * n..], &coefficients, products);
         add(columns, recent, &coefficients);
-        // Of large ones rounding is left, which the updated products do not have.
+        // If much was removed, the updated products have lost accuracy and are computed again.
         let after = norms(n, vectors, products);
         if after.iter().zip(&before).any(|(after, before)| *after < SMALL * before) {
             pencil.mass_product(vectors, products);
         }
     }
 
-    /// Makes vectors that are orthogonal to the basis so to each other by the Cholesky factor of their products, and
-    /// appends them; does nothing unless all are far from each other. `lengths` are those that they had before they
-    /// were made orthogonal to the basis, and have now.
+    /// Orthonormalizes vectors that are orthogonal to the basis by the Cholesky factor of their products, and appends
+    /// them; does nothing unless all are well separated. `before` and `lengths` are their lengths before and after
+    /// they were made orthogonal to the basis.
     fn append_together(
         &mut self,
         [vectors, products]: [&[f64]; 2],
@@ -224,8 +225,8 @@ impl Lanczos {
         Ok(true)
     }
 
-    /// Makes vectors that are orthogonal to the basis so to each other, one after the other, and appends those that are
-    /// something; `lengths` as above.
+    /// Orthonormalizes vectors that are orthogonal to the basis one by one, and appends those that do not vanish;
+    /// `before` and `lengths` as above.
     fn append_singly(
         &mut self,
         pencil: &mut Pencil,
@@ -260,7 +261,7 @@ impl Lanczos {
             for x in vector.iter_mut().chain(product.iter_mut()) {
                 *x /= norm;
             }
-            // A small rest is orthogonal to rounding of what it was before only: once more, at its own length.
+            // A small remainder is orthogonal only to the rounding of the original length: repeat at its own length.
             if small {
                 for _ in 0..2 {
                     remove(n, &self.locked, product, vector);
@@ -284,10 +285,10 @@ impl Lanczos {
         Ok(())
     }
 
-    /// The pairs of least frequency that have converged, up to the first that has not.
+    /// The converged pairs of least frequency, up to the first that has not converged.
     pub(super) fn pairs(&self, shift: f64) -> Option<Pairs> {
         let p = self.done;
-        // σ times the projection is a pure number: the same in any units, bit for bit if these are powers of two.
+        // σ times the projection is dimensionless: the same in any units, bitwise if the units are powers of two.
         let entry = |i: usize, j: usize| self.columns[j].get(i).copied().unwrap_or(0.0) * shift;
         let mut matrix = vec![0.0; p * p];
         for j in 0..p {
@@ -299,7 +300,7 @@ impl Lanczos {
         let mut pairs = Pairs { size: p, ..Pairs::default() };
         for k in (0..p).rev() {
             let (theta, vector) = (values[k], &vectors[k * p..(k + 1) * p]);
-            // (Columns are of the length that the basis had.)
+            // Each column has the length that the basis had at that time.
             let mut rest = vec![0.0; self.count - p];
             for (column, &x) in self.columns.iter().zip(vector) {
                 let below = column.get(p..).unwrap_or(&[]);
@@ -331,7 +332,8 @@ impl Lanczos {
     }
 }
 
-/// Takes what vectors have of an M-orthonormal basis; `products` are M times the vectors. Returns the coefficients.
+/// Removes the components of vectors in an M-orthonormal basis; `products` are M times the vectors. Returns the
+/// coefficients.
 pub(super) fn remove(n: usize, basis: &[f64], products: &[f64], vectors: &mut [f64]) -> Vec<f64> {
     let mut coefficients = vec![0.0; basis.len() / n * (products.len() / n)];
     if !coefficients.is_empty() {
@@ -341,7 +343,7 @@ pub(super) fn remove(n: usize, basis: &[f64], products: &[f64], vectors: &mut [f
     coefficients
 }
 
-/// Adds the coefficients of vectors by a basis to their columns, from one row on.
+/// Adds the coefficients of vectors in a basis to their columns, starting at row `first`.
 fn add(columns: &mut [Vec<f64>], first: usize, coefficients: &[f64]) {
     let height = coefficients.len() / columns.len();
     for (column, added) in columns.iter_mut().zip(coefficients.chunks(height.max(1))) {

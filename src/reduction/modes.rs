@@ -1,4 +1,4 @@
-//! Normal modes: the lowest eigenpairs of K φ = ω² M φ, computed or taken from another code, and checked.
+//! Normal modes: the lowest eigenpairs of K φ = ω² M φ, computed or imported, and checked.
 
 use super::lanczos::{Lanczos, Pairs, norms, remove};
 use super::pencil::{self, Pencil};
@@ -7,30 +7,31 @@ use crate::kernels::dense::transposed_product;
 use crate::real::Real;
 use faer::sparse::SparseColMatRef;
 
-/// Eigenvalues count as apart from this relative difference on.
+/// Relative difference from which eigenvalues count as distinct.
 const APART: f64 = 1e-5;
 
-/// Residual that computed modes may leave.
+/// Allowed residual of computed modes.
 const TOLERANCE: f64 = 1e-9;
 
-/// Vectors ahead while elastic modes are sought: the fewer, the sooner they converge.
+/// Band width for elastic modes: a narrow band converges with fewer solves.
 const BAND: usize = 4;
 
-/// How often a missing mode is sought with new random vectors.
+/// Number of attempts to find a missing mode with new random vectors.
 const ATTEMPTS: usize = 8;
 
 /// Normal modes of a body: K φ_k = ω_k² M φ_k, φ_jᵀ M φ_k = δ_jk, by ascending frequency.
 ///
-/// [`lowest`](Self::lowest) and [`up_to`](Self::up_to) find them by band Lanczos on (K + σM)⁻¹ M with one Cholesky
-/// factorization, σ > 0 small, so that bodies without supports are as good as others. Rigid motions come first, with
-/// ω = 0 exactly: all of every body, if there are several. Multiple frequencies come with all their modes. Nothing is
-/// missing: the number of eigenvalues below the last gap is counted by the inertia of K − μM, a second factorization.
+/// [`lowest`](Self::lowest) and [`up_to`](Self::up_to) compute them by band Lanczos on (K + σM)⁻¹ M with one Cholesky
+/// factorization and a small σ > 0, so that bodies need no supports. Rigid motions come first, with ω = 0 exactly; if
+/// there are several bodies, all rigid motions of each. Multiple frequencies have all their modes. Completeness is
+/// checked: the number of eigenvalues below the last gap is counted by the inertia of K − μM, with a second
+/// factorization.
 ///
-/// M may be singular: dofs without mass ([`mass::redistribute`](crate::mass::redistribute)) have no modes of their own,
-/// and follow the others statically. Modes are `f64` whatever the scalar of the matrices.
+/// M may be singular: dofs without mass ([`mass::redistribute`](crate::mass::redistribute)) have no modes of their
+/// own and follow the others statically. Modes are `f64` for any scalar of the matrices.
 ///
-/// Memory: two to four vectors for each mode while they are sought. For a few hundred modes at most; they are not
-/// meant to be all modes of a large body.
+/// Memory: two to four vectors per mode during the computation. Intended for at most a few hundred modes, not for all
+/// modes of a large body.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -66,21 +67,21 @@ pub struct Modes {
     solves: usize,
 }
 
-/// Modes of another code, for [`Modes::given`].
+/// Imported modes, for [`Modes::given`].
 #[derive(Clone, Copy, Debug)]
 pub struct GivenModes<'a> {
-    /// Circular frequencies ω_k (1/time), ascending, those of rigid motions zero.
+    /// Circular frequencies ω_k (1/time), ascending, zero for rigid motions.
     pub frequencies: &'a [f64],
     /// φ_k one after the other, each with one entry for each dof of the body, zero at supports; φᵀMφ = 1.
     pub shapes: &'a [f64],
-    /// The first circular frequency that is not among them; infinite if they are all.
+    /// The first circular frequency not among them; infinite if all modes are given.
     pub next: f64,
-    /// How far they may be off: the largest entry of ΦᵀMΦ − I, and the residual of each
-    /// ([`Modes::residual`]). About the digits that the file has.
+    /// Tolerance for the largest entry of ΦᵀMΦ − I and for the residual of each mode ([`Modes::residual`]): about the
+    /// accuracy of the digits in the file.
     pub tolerance: f64,
 }
 
-/// Which modes are to be found.
+/// Which modes to compute.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Wanted {
     Count(usize),
@@ -88,10 +89,10 @@ pub(super) enum Wanted {
 }
 
 impl Modes {
-    /// The `count` modes of least frequency, rigid motions included, of a body whose dofs `fixed` are held at zero.
+    /// The `count` lowest modes, including rigid motions, of a body whose dofs `fixed` are held at zero.
     ///
     /// M and K are symmetric with both triangles stored, M positive definite on the dofs that have mass, K positive
-    /// semidefinite. Where `count` would cut a multiple frequency, the modes taken of it are any.
+    /// semidefinite. If `count` splits a multiple frequency, an arbitrary subset of its modes is returned.
     ///
     /// # Errors
     ///
@@ -136,8 +137,8 @@ impl Modes {
         Self::find(&mut Pencil::new(mass, stiffness, free)?, wanted)
     }
 
-    /// Modes of another code (an export, a file), checked against M and K: orthonormal, residuals, and that none is
-    /// missing below the last. Rigid ones are computed again from what is given, to rounding.
+    /// Imported modes, checked against M and K for orthonormality, residuals, and completeness below the last mode.
+    /// Rigid modes are recomputed from the given ones, to rounding.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -182,7 +183,8 @@ impl Modes {
         let rigid = modes.frequencies.iter().take_while(|&&omega| omega == 0.0).count();
         let given = shapes[..rigid * n].to_vec();
         let polished = polish(pencil, given.clone())?;
-        // Rigid motions may have been mixed, never with others: what is left beside them is an error.
+        // Rigid motions may have been combined with each other, not with elastic modes: the remaining part is an
+        // error.
         let mut products = vec![0.0; given.len()];
         pencil.mass_product(&given, &mut products);
         let mut rest = given;
@@ -217,7 +219,7 @@ impl Modes {
         Ok(found)
     }
 
-    /// Finds them.
+    /// Computes the modes.
     pub(super) fn find(pencil: &mut Pencil, wanted: Wanted) -> Result<Self> {
         match wanted {
             Wanted::Count(0) => {
@@ -253,14 +255,14 @@ impl Modes {
                         frequency: cut.next.unwrap_or(cut.last).sqrt(),
                     });
                 }
-                // A multiple frequency with more modes than the band is wide: another start finds the rest.
+                // A multiple frequency with more modes than the width of the band: another start finds the others.
                 lanczos.draw(pencil)?;
                 continue;
             }
             let mut shapes = rigid;
             shapes.extend(purified(pencil, lanczos.vectors(&pairs, cut.count - zeros)?)?);
             if pencil.rank < n {
-                // What was off by parts of lower modes is so by more of them.
+                // Removing the null space of M may have left components of lower modes: orthonormalize again.
                 shapes = orthonormal(pencil, shapes)?;
             }
             return Self::checked(pencil, shapes, zeros, cut.next);
@@ -268,7 +270,7 @@ impl Modes {
         Err(Error::ModesMissed { found: lanczos.count(), expected: pencil.rank, frequency: 0.0 })
     }
 
-    /// Modes with their Rayleigh quotients, if they leave no residual.
+    /// Modes with their Rayleigh quotients, if their residuals are within tolerance.
     fn checked(pencil: &mut Pencil, shapes: Vec<f64>, rigid: usize, next: Option<f64>) -> Result<Self> {
         let n = pencil.size();
         check_orthonormal(pencil, &shapes, TOLERANCE)?;
@@ -297,7 +299,7 @@ impl Modes {
         Ok(modes)
     }
 
-    /// The largest residual of the elastic modes; refuses those beyond a tolerance.
+    /// The largest residual of the elastic modes; rejects residuals beyond a tolerance.
     fn worst_residual(&self, pencil: &mut Pencil, tolerance: f64) -> Result<f64> {
         let n = pencil.size();
         let (rigid, elastic) = self.shapes.split_at(self.rigid * n);
@@ -310,7 +312,7 @@ impl Modes {
                 let inverse = self.frequencies[mode + k].powi(2) + pencil.shift;
                 x.iter().zip(y).for_each(|(x, y)| *y = *x - inverse * *y);
             }
-            // (What rounding leaves of rigid motions is 1/σ times as large as elsewhere, and no error of the mode.)
+            // Rounding in rigid motions is amplified by 1/σ and is no error of the mode.
             let mut products = vec![0.0; rest.len()];
             pencil.mass_product(&rest, &mut products);
             remove(n, rigid, &products, &mut rest);
@@ -334,12 +336,12 @@ impl Modes {
         self.frequencies.len()
     }
 
-    /// How many of them, the first ones, are rigid motions: one for a free bar, three in the plane, six in space.
+    /// Number of rigid motions, which come first: one for a free bar, three in the plane, six in space.
     pub fn rigid(&self) -> usize {
         self.rigid
     }
 
-    /// The first circular frequency beyond them (1/time); infinite if they are all modes.
+    /// The first circular frequency beyond the modes (1/time); infinite if these are all modes.
     pub fn next_frequency(&self) -> f64 {
         self.next
     }
@@ -356,24 +358,24 @@ impl Modes {
         shape
     }
 
-    /// The largest residual of the elastic modes, ‖φ − (ω² + σ)(K + σM)⁻¹Mφ‖ in the norm of M: by so much, relatively,
-    /// ω² + σ is off an eigenvalue at most.
+    /// The largest residual of the elastic modes, ‖φ − (ω² + σ)(K + σM)⁻¹Mφ‖ in the norm of M: an upper bound of the
+    /// relative distance of ω² + σ from an eigenvalue.
     pub fn residual(&self) -> f64 {
         self.residual
     }
 
-    /// Sparse factorizations that finding and checking them took.
+    /// Number of sparse factorizations for computing and checking the modes.
     pub fn factorizations(&self) -> usize {
         self.factorizations
     }
 
-    /// Right-hand sides that finding and checking them solved for, several at a time: no eigensolver on these matrices
-    /// that takes as many can be faster than they are.
+    /// Number of right-hand sides solved for computing and checking the modes, several at a time. A lower bound of
+    /// the cost: no eigensolver that solves as many on these matrices can be faster.
     pub fn solves(&self) -> usize {
         self.solves
     }
 
-    /// Number of dofs of the body, supports included.
+    /// Number of dofs of the body, including supports.
     pub fn dofs(&self) -> usize {
         self.dofs
     }
@@ -384,17 +386,17 @@ fn too_many(count: usize) -> Error {
     Error::Parameter { name: "the number of modes", value: count as f64, range }
 }
 
-/// Where the modes wanted end among those found.
+/// End of the wanted modes among the computed ones.
 struct Cut {
-    /// Modes wanted; those up to the first gap behind them.
+    /// Number of wanted modes, and number of modes up to the first gap after them.
     count: usize,
     distinct: usize,
-    /// Eigenvalues on both sides of the gap; none behind the last mode there is.
+    /// Eigenvalues on both sides of the gap; `next` is `None` after the last mode.
     last: f64,
     next: Option<f64>,
 }
 
-/// The cut, if the pairs found reach beyond it; `zeros` rigid motions come before them.
+/// The cut, if the computed pairs extend beyond it; `zeros` rigid motions come before them.
 fn cut(values: &[f64], zeros: usize, wanted: Wanted, all: bool) -> Result<Option<Cut>> {
     let value = |k: usize| if k < zeros { 0.0 } else { values[k - zeros] };
     let found = zeros + values.len();
@@ -417,7 +419,7 @@ fn cut(values: &[f64], zeros: usize, wanted: Wanted, all: bool) -> Result<Option
     Ok(Some(Cut { count, distinct, last, next: (distinct < found).then(|| value(distinct)) }))
 }
 
-/// Multiplies until the modes wanted, and the first one behind them, have converged.
+/// Iterates until the wanted modes, and the first one after them, have converged.
 fn converge(pencil: &mut Pencil, lanczos: &mut Lanczos, zeros: usize, wanted: Wanted) -> Result<(Pairs, Cut)> {
     let mut check = match wanted {
         Wanted::Count(count) => lanczos.count() + count.saturating_sub(zeros) + lanczos.block,
@@ -445,9 +447,9 @@ fn converge(pencil: &mut Pencil, lanczos: &mut Lanczos, zeros: usize, wanted: Wa
     }
 }
 
-/// The rigid motions, M-orthonormal, and an iteration that is orthogonal to them.
+/// The rigid motions, M-orthonormal, and a Lanczos iteration orthogonal to them.
 ///
-/// They are found first: beside their eigenvalue 1/σ those of elastic modes would be lost in rounding.
+/// They are computed first: next to their eigenvalue 1/σ the eigenvalues of elastic modes would be lost in rounding.
 fn rigid_motions(pencil: &mut Pencil) -> Result<(Vec<f64>, Lanczos)> {
     let n = pencil.size();
     let block = (6 * pencil.bodies + 2).clamp(8, 64).min(pencil.rank);
@@ -476,7 +478,7 @@ fn rigid_motions(pencil: &mut Pencil) -> Result<(Vec<f64>, Lanczos)> {
     }
 }
 
-/// Vectors without their parts in the null space of M, if it is singular.
+/// Vectors without components in the null space of M, if it is singular.
 fn purified(pencil: &mut Pencil, vectors: Vec<f64>) -> Result<Vec<f64>> {
     let n = pencil.size();
     if pencil.rank == n || vectors.is_empty() {
@@ -507,14 +509,14 @@ fn polish(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
     Ok(vectors)
 }
 
-/// Makes vectors M-orthonormal, one after the other.
+/// Makes vectors M-orthonormal, one by one.
 fn orthonormal(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
     let n = pencil.size();
     let mut product = vec![0.0; n];
     for k in 0..vectors.len() / n {
         let (done, rest) = vectors.split_at_mut(k * n);
         let vector = &mut rest[..n];
-        // The length first: rigid motions that come from a solve are 1/σ long.
+        // Normalize first: rigid motions from a solve have length of order 1/σ.
         for pass in 0..3 {
             if pass > 0 {
                 pencil.mass_product(vector, &mut product);
@@ -540,7 +542,7 @@ fn lengths(pencil: &mut Pencil, vectors: &[f64]) -> Vec<f64> {
     norms(n, vectors, &products)
 }
 
-/// Refuses a residual beyond a tolerance, or one that is not a number.
+/// Rejects a residual that is beyond a tolerance or NaN.
 fn within(mode: usize, residual: f64, tolerance: f64) -> Result<()> {
     match residual <= tolerance {
         true => Ok(()),
@@ -561,7 +563,7 @@ fn check_orthonormal(pencil: &mut Pencil, shapes: &[f64], tolerance: f64) -> Res
     Ok(())
 }
 
-/// Refuses motions given as rigid that have strain energy, against that of the first elastic mode or of an element.
+/// Rejects motions given as rigid that have strain energy, relative to the first elastic mode or to an element.
 fn check_rigid(pencil: &mut Pencil, modes: &Modes, tolerance: f64) -> Result<()> {
     let n = pencil.size();
     let rigid = &modes.shapes[..modes.rigid * n];
@@ -603,7 +605,7 @@ fn check_given(modes: &GivenModes<'_>, dofs: usize) -> Result<()> {
     }
 }
 
-/// How many eigenvalues are below a point between two; none if every factorization breaks down.
+/// Number of eigenvalues below a point between two; `None` if every factorization fails.
 fn count_between(pencil: &mut Pencil, last: f64, next: f64) -> Result<Option<usize>> {
     for share in [0.5, 0.4375, 0.625] {
         if let Some(count) = pencil.count_below(last + share * (next - last))? {

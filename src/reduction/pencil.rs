@@ -1,7 +1,7 @@
 //! The pencil K − λM of a body on its free dofs, in `f64`: products, the shifted factor K + σM, counts of eigenvalues.
 //!
-//! Eigenpairs are sought in `f64` whatever the scalar of the run: rigid motions are told from elastic ones by rounding,
-//! and in `f32` a long bar would have none that can be told.
+//! Eigenpairs are computed in `f64` for any scalar of the run: rigid motions are distinguished from elastic ones by
+//! rounding, and in `f32` the elastic motions of a long bar could not be distinguished.
 
 use crate::error::{Error, Result};
 use crate::kernels::inertia::negative_eigenvalues;
@@ -12,37 +12,37 @@ use crate::real::Real;
 use crate::sparse::{self, Combination, Product, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
 
-/// The shift σ over the median of K_ii/M_ii, the square of a frequency of single elements: small against all elastic
-/// frequencies but those of the longest chains, and large against the rounding of K.
+/// The shift σ relative to the median of K_ii/M_ii, the squared frequency of single elements: small compared with all
+/// elastic frequencies except those of very long chains, and large compared with the rounding of K.
 const SHIFT: f64 = 1e-8;
 
-/// A motion is rigid if its strain energy is so many units of rounding of the sum that it is.
+/// A motion is rigid if its strain energy is at most this many roundings of its sum of terms.
 const RIGID: f64 = 32.0;
 
 #[derive(Debug)]
 pub(super) struct Pencil {
-    /// Dofs of the body, and those of them that are free, ascending.
+    /// Dofs of the body, and the free ones among them, ascending.
     pub(super) dofs: usize,
     pub(super) free: Vec<usize>,
     pub(super) mass: SparseColMat<usize, f64>,
     pub(super) stiffness: SparseColMat<usize, f64>,
     by_mass: Product<f64>,
     by_stiffness: Product<f64>,
-    /// The pattern of both, for K + σM and K − μM.
+    /// The pattern of K + σM and K − μM.
     sum: Combination,
-    /// Free dofs with mass: there are so many finite eigenvalues.
+    /// Number of free dofs with mass, which is the number of finite eigenvalues.
     pub(super) rank: usize,
     pub(super) shift: f64,
-    /// What rounding of K leaves of an eigenvalue, at most.
+    /// Largest error of an eigenvalue from the rounding of K.
     pub(super) blur: f64,
     factor: Box<dyn Factorization<f64>>,
     /// Factorizations so far.
     pub(super) factorizations: usize,
-    /// Right-hand sides solved for so far.
+    /// Right-hand sides solved so far.
     pub(super) solves: usize,
     /// Relative rounding of the entries of K.
     rounding: f64,
-    /// Parts that nothing connects.
+    /// Number of unconnected parts.
     pub(super) bodies: usize,
 }
 
@@ -88,7 +88,7 @@ pub(super) fn check<T: Real>(
     Ok(dofs)
 }
 
-/// Rows `free` and columns `columns` of a matrix; places beyond them are dropped.
+/// Rows `free` and columns `columns` of a matrix; other entries are dropped.
 pub(super) fn part<T: Real>(
     a: SparseColMatRef<'_, usize, T>,
     free: &[usize],
@@ -109,7 +109,7 @@ pub(super) fn part<T: Real>(
 }
 
 impl Pencil {
-    /// Of checked matrices.
+    /// For checked matrices.
     pub(super) fn new<T: Real>(
         mass: SparseColMatRef<'_, usize, T>,
         stiffness: SparseColMatRef<'_, usize, T>,
@@ -127,7 +127,7 @@ impl Pencil {
             return Err(Error::Mass { dof: free[0], value: 0.0 });
         };
         let rounding = T::epsilon().value();
-        // Bodies that are all rigid have no frequency, and any shift does.
+        // If all bodies are rigid there is no frequency, and any shift works.
         let shift = if median > 0.0 { median * SHIFT.max(64.0 * rounding) } else { 1.0 };
         let sum = Combination::new(n, &[], &[k.symbolic(), m.symbolic()])?;
         let mut pencil = Self {
@@ -193,18 +193,18 @@ impl Pencil {
         self.factor.solve(x)
     }
 
-    /// How many eigenvalues are below μ, by the signs of the pivots of K − μM (Sylvester's law of inertia); none if
-    /// that factorization breaks down.
+    /// Number of eigenvalues below μ, from the signs of the pivots of K − μM (Sylvester's law of inertia); `None` if
+    /// that factorization fails.
     pub(super) fn count_below(&mut self, mu: f64) -> Result<Option<usize>> {
         let values = self.shifted(-mu)?;
         let symbolic = symbolic_cholesky(&Ordering::default(), self.sum.pattern(), &[])?;
         self.factorizations += 1;
-        // (Dofs without mass, on which K is positive definite, add positive eigenvalues only.)
+        // Dofs without mass, on which K is positive definite, add only positive eigenvalues.
         Ok(negative_eigenvalues(&symbolic, self.sum.view(&values)))
     }
 
-    /// The Rayleigh quotient of a motion of unit modal mass, zero if it is rigid: then its strain energy is what
-    /// rounding leaves of a sum of larger terms. `product` is K x.
+    /// The Rayleigh quotient of a motion of unit modal mass. Zero if it is rigid, that is, if its strain energy is
+    /// within the rounding of its sum of terms. `product` is K x.
     pub(super) fn quotient(&self, x: &[f64], product: &[f64]) -> f64 {
         let energy: f64 = x.iter().zip(product).map(|(x, f)| x * f).sum();
         let k = self.stiffness.as_ref();
@@ -216,7 +216,7 @@ impl Pencil {
         if energy.abs() <= RIGID * self.rounding * size { 0.0 } else { energy }
     }
 
-    /// Brings columns on the free dofs to all dofs.
+    /// Extends columns on the free dofs to all dofs.
     pub(super) fn expand(&self, x: &[f64]) -> Vec<f64> {
         let n = self.size();
         let mut out = vec![0.0; x.len() / n * self.dofs];
@@ -226,13 +226,13 @@ impl Pencil {
         out
     }
 
-    /// The free dofs of columns on all of them.
+    /// Restricts columns on all dofs to the free dofs.
     pub(super) fn restrict(&self, x: &[f64]) -> Vec<f64> {
         x.chunks_exact(self.dofs).flat_map(|x| self.free.iter().map(|&dof| x[dof])).collect()
     }
 }
 
-/// The number of parts of a pattern that nothing connects.
+/// The number of unconnected parts of a pattern.
 fn parts(sum: &Combination, n: usize) -> usize {
     let pattern = sum.pattern();
     let (mut seen, mut stack, mut count) = (vec![false; n], Vec::new(), 0);

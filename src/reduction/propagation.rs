@@ -1,4 +1,4 @@
-//! Reduced bodies in steps that are exact between contacts: no scheme, but the solution of each mode itself.
+//! Reduced bodies without a time scheme: each mode is solved exactly within a step.
 
 use super::body::ReducedBody;
 use super::builder::Boundary;
@@ -15,14 +15,14 @@ use std::ops::Range;
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
 
-/// Share of the rounding of a gap's terms below which it is zero.
+/// A gap below this many roundings of its terms is zero.
 const ROUNDING: f64 = 16.0;
 
-/// Names of the two matrices of contact, for solvers that keep what they have computed: at the start, and of the steps.
+/// Version numbers of the two contact matrices, for solvers that reuse data: at the start, and in the steps.
 const VERSIONS: [u64; 2] = [1, 2];
 
-/// Reduced bodies, propagated exactly: between the ends of a step every mode moves as its equation says, under a
-/// contact force that is linear in time.
+/// Reduced bodies, propagated exactly: within a step every mode follows its equation under a contact force that is
+/// linear in time.
 ///
 /// ```math
 /// \begin{aligned}
@@ -32,21 +32,20 @@ const VERSIONS: [u64; 2] = [1, 2];
 /// \end{aligned}
 /// ```
 ///
-/// The recurrence of each mode is that of Nigam and Jennings (Bull. Seism. Soc. Am. 59, 1969), also known as the
-/// piecewise exact method; contact acts at the end of the step. It is no [`TimeIntegrator`](crate::TimeIntegrator):
-/// its coefficients differ from mode to mode, which rows of a tableau do not. Dofs are those of
+/// Each mode uses the recurrence of Nigam and Jennings (Bull. Seism. Soc. Am. 59, 1969), also known as the piecewise
+/// exact method; contact is imposed at the end of the step. It is no [`TimeIntegrator`](crate::TimeIntegrator): its
+/// coefficients differ from mode to mode, which a tableau cannot express. Dofs are numbered as in
 /// [`Blocks`](super::Blocks): one body after the other, its modes, then its contact dofs.
 ///
 /// * Free motion is exact, damped or not, in steps of any length up to the limit below, and so is motion under loads
-///   that are linear in each step. In contact the force is of second order where it is smooth.
-/// * The step is limited: ω_r h ≤ π, ω_r the largest frequency of the modes, and refused beyond: a mode that turns by
-///   more than half a circle in a step is not controlled by one value of the force. Of bodies that are not tapered
-///   a quarter of that: with longer steps they gained energy when tried.
-/// * No theorem says that energy is kept in contact, nor that it does not grow; what it does is measured in
-///   `docs/reduction.md`.
-/// * What is exact are the modes that were given: those of a mesh are late by its dispersion, which no scheme hides
-///   here. Take a parent fine enough (`docs/reduction.md`).
-/// * Without friction, bonds and compliant laws; G is constant (the obstacle may move).
+///   that are linear in each step. In contact the force is second-order accurate where it is smooth.
+/// * The step is limited to ω_r h ≤ π, with ω_r the largest frequency of the modes: one value of the force does not
+///   control a mode that turns by more than half a circle in a step. Bodies that are not tapered have a quarter of
+///   that limit: in tests they gained energy with longer steps.
+/// * Energy in contact is not proven to be conserved or bounded; `docs/reduction.md` has measurements.
+/// * The given modes are exact: modes of a mesh are delayed by its dispersion, which no scheme compensates here. Use
+///   a sufficiently fine parent (`docs/reduction.md`).
+/// * No friction, bonds or compliant laws; G is constant (the obstacle may move).
 ///
 /// ```
 /// use contact_dynamics::LinearRows;
@@ -84,7 +83,7 @@ pub struct ModalPropagation<'a, T: Real> {
     loads: Loads<'a, T>,
     contact: Contact<'a, T>,
     state: Motion<T>,
-    /// What a step writes; it becomes the state if nothing fails.
+    /// The result of a step; it becomes the state if nothing fails.
     next: Motion<T>,
 }
 
@@ -101,7 +100,7 @@ pub struct ModalPropagationBuilder<'a, T: Real> {
     solver: Box<dyn ContactSolver<T> + 'a>,
 }
 
-/// A load that changes in time.
+/// A time-dependent load.
 struct LoadFunction<'a, T>(Load<'a, T>);
 
 impl<T> std::fmt::Debug for LoadFunction<'_, T> {
@@ -110,7 +109,7 @@ impl<T> std::fmt::Debug for LoadFunction<'_, T> {
     }
 }
 
-/// A body: where its modes and contact dofs stand, and how they answer.
+/// A body: its dofs and the response of its modes.
 #[derive(Debug)]
 struct Body<T> {
     modes: Range<usize>,
@@ -282,12 +281,12 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         self.h
     }
 
-    /// Displacements of all dofs: of each body its modes, then its contact dofs.
+    /// Displacements of all dofs: for each body its modes, then its contact dofs.
     pub fn displacement(&self) -> &[T] {
         &self.state.displacement
     }
 
-    /// Velocities of all dofs; those of contact dofs P η̇ + F λ̇, with λ̇ of the step before.
+    /// Velocities of all dofs; for contact dofs P η̇ + F λ̇, with λ̇ of the last step.
     pub fn velocity(&self) -> &[T] {
         &self.state.velocity
     }
@@ -308,7 +307,7 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         T::of(0.5) * modes.map(|&v| v * v).sum::<T>()
     }
 
-    /// Elastic energy: of the modes, and of what follows the contact forces statically.
+    /// Elastic energy of the modes and of the static response to contact forces.
     pub fn elastic_energy(&self) -> T {
         let of_body = |body: &Body<T>| {
             let modes = self.state.displacement[body.modes.clone()].iter().zip(&body.squares);
@@ -319,11 +318,11 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         T::of(0.5) * self.bodies.iter().map(of_body).sum::<T>()
     }
 
-    /// Steps until the time is reached or passed, to rounding of the step.
+    /// Steps until the time is reached or passed, within rounding of the step.
     ///
     /// # Errors
     ///
-    /// As [`step`](Self::step); the state is that of the last step that did not fail.
+    /// As [`step`](Self::step); the state is the one after the last successful step.
     pub fn run_until(&mut self, time: f64) -> Result<()> {
         while time - self.time() > 1e-6 * self.h {
             self.step()?;
@@ -336,7 +335,7 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
     /// # Errors
     ///
     /// [`Error::NotFinite`] for a load, [`Error::StepNotFinite`], [`Error::Contact`] and
-    /// [`Error::ContradictoryContacts`]; the state is then as it was.
+    /// [`Error::ContradictoryContacts`]; the state is then unchanged.
     pub fn step(&mut self) -> Result<()> {
         let time = self.start + (self.steps + 1) as f64 * self.h;
         self.loads.evaluate(time)?;
@@ -353,7 +352,7 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         for body in bodies.iter() {
             body.push(&mut contact.forces, next);
             body.follow(&next.force, &mut next.displacement);
-            // λ̇ takes the place of λ.
+            // λ̇ replaces λ.
             for dof in body.contact.clone() {
                 contact.forces[dof] = rate * (next.force[dof] - state.force[dof]);
             }
@@ -371,7 +370,7 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         Ok(())
     }
 
-    /// Contact dofs and forces at the start, from those of the modes: static.
+    /// Computes contact dofs and forces at the start from the modes, statically.
     fn begin(&mut self) -> Result<()> {
         self.loads.evaluate(self.start)?;
         let Self { bodies, state, loads, contact, .. } = self;
@@ -401,7 +400,7 @@ impl<T: Real> Loads<'_, T> {
     }
 }
 
-/// Refuses values that are not finite.
+/// Rejects values that are not finite.
 fn finite<T: Real>(what: &'static str, values: &[T]) -> Result<()> {
     match values.iter().position(|x| !x.is_finite()) {
         Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
@@ -460,7 +459,8 @@ impl<T: Real> Body<T> {
         })
     }
 
-    /// The compliance of the contact dofs over a step: P diag(what a unit force at its end moves each mode) Pᵀ + F.
+    /// The compliance of the contact dofs over a step: P D Pᵀ + F, with D the diagonal of the modes' responses to a
+    /// unit force at the end of the step.
     fn compliance(&self) -> Vec<T> {
         let (count, contacts) = (self.modes.len(), self.contact.len());
         let mut out = self.flexibility.clone();
@@ -475,14 +475,14 @@ impl<T: Real> Body<T> {
         out
     }
 
-    /// Loads as forces on modes and contact dofs.
+    /// Converts loads to forces on modes and contact dofs.
     fn take_loads(&self, loads: &[T], force: &mut [T]) {
         force[self.modes.clone()].copy_from_slice(&loads[self.modes.clone()]);
         force[self.contact.clone()].fill(T::zero());
         self.press(&loads[self.contact.clone()], force);
     }
 
-    /// Adds forces on the contact dofs, and what they do to the modes.
+    /// Adds forces on the contact dofs, and the resulting forces on the modes.
     fn press(&self, forces: &[T], out: &mut [T]) {
         let (modes, contact) = (self.modes.clone(), self.contact.clone());
         for (row, &force) in self.coupling.chunks_exact(modes.len()).zip(forces) {
@@ -491,7 +491,7 @@ impl<T: Real> Body<T> {
         T::axpy(T::one(), forces, &mut out[contact]);
     }
 
-    /// The modes at the end of a step without contact forces there.
+    /// The modes at the end of a step without contact forces at that time.
     fn move_freely(&self, state: &Motion<T>, next: &mut Motion<T>) {
         for (dof, step) in self.modes.clone().zip(&self.steps) {
             let (u, v, forces) = (state.displacement[dof], state.velocity[dof], [state.force[dof], next.force[dof]]);
@@ -503,8 +503,8 @@ impl<T: Real> Body<T> {
         }
     }
 
-    /// What contact forces at the end of the step add: `forces` has those on the contact dofs, and those on the modes
-    /// are written there.
+    /// Adds the response to contact forces at the end of the step. `forces` has the forces on the contact dofs; the
+    /// forces on the modes are written to it.
     fn push(&self, forces: &mut [T], next: &mut Motion<T>) {
         let (before, contact) = forces.split_at_mut(self.contact.start);
         let (pushed, contact) = (&mut before[self.modes.clone()], &contact[..self.contact.len()]);
@@ -606,7 +606,7 @@ impl<'a, T: Real> Contact<'a, T> {
         Ok(out)
     }
 
-    /// G u + g0, and for each row the size of the terms.
+    /// G u + g0, and for each row the magnitude of its terms.
     fn gaps(&mut self, time: f64, motion: &mut Motion<T>) -> Result<()> {
         self.rows.gaps(time, &self.at_rest, &mut motion.gaps)?;
         for ((gap, size), entries) in motion.gaps.iter_mut().zip(&mut self.tolerance).zip(&self.entries) {
@@ -617,7 +617,7 @@ impl<'a, T: Real> Contact<'a, T> {
         Ok(())
     }
 
-    /// The multipliers at the end of a step, from displacements without them; with another W at the start.
+    /// The multipliers at the end of a step, from displacements without contact; at the start with another W.
     fn solve(&mut self, time: f64, delassus: Option<&[T]>, motion: &mut Motion<T>) -> Result<()> {
         self.gaps(time, motion)?;
         let share = T::of(ROUNDING) * T::epsilon();

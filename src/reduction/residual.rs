@@ -1,21 +1,21 @@
-//! Residual flexibility: what a truncated set of modes leaves of the static response.
+//! Residual flexibility: the static response that a truncated set of modes does not contain.
 
 use super::lanczos::remove;
 use super::pencil::Pencil;
 use crate::error::{Error, Result};
 use crate::memory;
 
-/// Steps of the iteration; it gains the factor σ/(ω² + σ) a step, ω the first frequency that is not among the modes.
+/// Iteration limit; each iteration gains the factor σ/(ω² + σ), with ω the first frequency not among the modes.
 const STEPS: usize = 2000;
 
-/// A load of which less than this share is left counts as taken up by the modes.
+/// If the remaining share of a load is below this value, the modes contain the load.
 const NOTHING: f64 = 1e-12;
 
-/// `(G − Σ φ φᵀ/ω²) f` for columns f on the free dofs, G the flexibility without rigid motion: the static response to
-/// the part of a load that the modes do not take up. It is M-orthogonal to them.
+/// `(G − Σ φ φᵀ/ω²) f` for columns f on the free dofs, with G the flexibility without rigid motion: the static
+/// response to the part of a load that the modes do not contain. It is M-orthogonal to the modes.
 ///
-/// K x = f − M Φ Φᵀ f by Richardson's iteration with the factor of K + σM, in the complement of the modes: exact, with
-/// no other factor and whatever σ.
+/// Solves K x = f − M Φ Φᵀ f by Richardson's iteration with the factor of K + σM, in the complement of the modes:
+/// exact for any σ, without another factorization.
 pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Result<Vec<f64>> {
     let n = pencil.size();
     let columns = loads.len() / n;
@@ -28,7 +28,7 @@ pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Re
     pencil.mass_product(shapes, &mut inertia);
     balance(n, shapes, &inertia, &mut rest);
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // The weight of a free body is taken up by its rigid motions: of such loads rounding is left.
+    // The rigid motions of a free body contain its weight: only rounding remains of such loads.
     let mut loads = loads.to_vec();
     for (load, rest) in loads.chunks_exact_mut(n).zip(rest.chunks_exact_mut(n)) {
         if norm(rest) <= NOTHING * norm(load) {
@@ -47,7 +47,7 @@ pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Re
         x.iter_mut().zip(&step).for_each(|(x, d)| *x += d);
         let last = std::mem::replace(&mut change, norm(&step));
         size = norm(&x);
-        // As far as rounding lets it.
+        // Converged as far as rounding allows.
         if change <= 1e-13 * size || (change <= 1e-9 * size && change >= 0.5 * last) {
             return Ok(x);
         }
@@ -60,7 +60,7 @@ pub(super) fn response(pencil: &mut Pencil, shapes: &[f64], loads: &[f64]) -> Re
     Err(Error::LinearNotConverged { method, iterations: STEPS, residual, tolerance: 1e-13 })
 }
 
-/// Takes from loads what modes take up: `f − M Φ Φᵀ f`.
+/// Removes from loads the part that modes contain: `f − M Φ Φᵀ f`.
 fn balance(n: usize, shapes: &[f64], inertia: &[f64], loads: &mut [f64]) {
     let columns = loads.len() / n;
     let mut shares = vec![0.0; shapes.len() / n * columns];

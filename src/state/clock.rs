@@ -42,7 +42,7 @@ impl Clock {
         (t - self.origin) - self.elapsed_at(0.0)
     }
 
-    /// Whether t is reached, but for 1e-9 h and the rounding of t.
+    /// Whether t is reached, within 1e-9 h and the rounding of t.
     pub(crate) fn has_reached(&self, t: f64) -> bool {
         t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
     }
