@@ -1,8 +1,8 @@
 //! Properties that follow from the rows of a tableau: order, spectral radius, stability limit, period error, damping,
 //! overshoot.
 //!
-//! All figures are computed from the rows of a [`Tableau`] alone, for the scalar equation `a + 2 ξ ω v + ω² u = 0` with
-//! Ω = ω h, so they hold for a scheme of one's own as well.
+//! All figures are computed only from the rows of a [`Tableau`], for the scalar equation `a + 2 ξ ω v + ω² u = 0`
+//! with Ω = ω h, so they also hold for user-defined schemes.
 
 mod local_error;
 mod massless;
@@ -45,12 +45,13 @@ fn matrix(rows: &[Vec<f64>]) -> Mat<f64> {
 
 /// Eigenvalues of the amplification matrix.
 ///
-/// For Ω > 1 the matrix is scaled to (U, V/Ω, A/Ω²) first: eigenvalues stay, rounding does not grow with Ω.
+/// For Ω > 1 the matrix is first scaled to (U, V/Ω, A/Ω²): eigenvalues are unchanged, and rounding does not grow with
+/// Ω.
 pub fn eigenvalues(tableau: &Tableau, omega: f64, xi: f64) -> Vec<c64> {
     roots(tableau, omega, 2.0 * xi * omega)
 }
 
-/// Eigenvalues at Ω and Δ = c h, which for a mode without stiffness is not 2 ξ Ω.
+/// Eigenvalues at Ω and Δ = c h, which for a mode without stiffness differs from 2 ξ Ω.
 fn roots(tableau: &Tableau, omega: f64, delta: f64) -> Vec<c64> {
     let a = matrix(&tableau.step_map([omega * omega, delta, 1.0]));
     let scale = |i: usize| match i % 3 {
@@ -77,7 +78,7 @@ fn moduli(roots: &[c64]) -> impl Iterator<Item = f64> + '_ {
 }
 
 /// Relative elongation of the (damped) period and damping ratio of the principal root at `h_over_period` = h/T, for ξ
-/// of the equation. `None` if the principal roots are real (no oscillation is left).
+/// of the equation. `None` if the principal roots are real (no oscillation).
 ///
 /// The damping ratio is −ln|root| over the angle of the root, as the literature tabulates it: numerical and physical
 /// damping together, ξ/√(1 − ξ²) for an exact scheme.

@@ -9,11 +9,11 @@
 /// | [`LinearRows`](crate::contact::LinearRows) | the row, in the order in which rows were added | 0 |
 /// | [`GapFunction`](crate::contact::GapFunction) | the function, in the order in which they were added | 0 |
 /// | [`NodesOnObstacle`](crate::contact::NodesOnObstacle) | the node | 0 |
-/// | `NodeToFacet` | the node | the pass: 0 for nodes of `one`, 1 for those of `other`; beside it in a dent see there |
+/// | `NodeToFacet` | the node | the side: 0 for nodes of `one`, 1 for nodes of `other`; in a dent see `NodeToFacet` |
 /// | `Mortar` | the slave node | 0 |
 /// | `Tie` | the slave node | the axis |
 /// | `EdgeToEdge` | the edge of the first surface | the edge of the second |
-/// | of a host | what it says | what it says |
+/// | a host's own | as given | as given |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactId {

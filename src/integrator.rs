@@ -1,4 +1,4 @@
-//! Time integrators: how u, v and a follow from the unknown of a step.
+//! Time integrators: how u, v and a are computed from the unknown of a step.
 
 mod bathe;
 mod bdf2;
@@ -43,7 +43,7 @@ use std::ops::RangeInclusive;
 /// A time-integration scheme: a name and a [`Tableau`], nothing else.
 ///
 /// Effective matrix, right-hand side, start-up, momentum functional, λ_v/λ_a and history projection are derived from
-/// the rows. A scheme of one's own is one function:
+/// the rows. A user's scheme is a single function:
 ///
 /// ```
 /// use contact_dynamics::tableau::{Rows, Stage, Tableau, U, V, Z};
@@ -69,7 +69,7 @@ use std::ops::RangeInclusive;
 /// assert!((radius - 1.0 / 5.0_f64.sqrt()).abs() < 1e-12);
 /// ```
 pub trait TimeIntegrator: std::fmt::Debug + Send {
-    /// Name with parameters, as a table or an error message shows it.
+    /// Name with parameters, as printed in tables and error messages.
     fn name(&self) -> String;
 
     /// The rows of the scheme.
@@ -85,7 +85,7 @@ impl<I: TimeIntegrator + ?Sized> TimeIntegrator for Box<I> {
     }
 }
 
-/// A parameter of a scheme, refused outside its range (NaN as well); `range` is the range in words.
+/// Checks a parameter of a scheme; rejects NaN and values outside its range, described by `range`.
 fn within(name: &'static str, value: f64, allowed: RangeInclusive<f64>, range: &'static str) -> Result<f64> {
     match allowed.contains(&value) {
         true => Ok(value),

@@ -1,5 +1,5 @@
-//! The loops that take most of the time of a run, generic over the scalar alone; `crate::real` instantiates them for
-//! `f32` and `f64`.
+//! The loops that dominate the run time, generic over the scalar only; `crate::real` instantiates them for `f32` and
+//! `f64`.
 
 pub(crate) mod block_sweep;
 pub(crate) mod chain;

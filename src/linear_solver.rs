@@ -28,7 +28,7 @@ use crate::real::Real;
 use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
-/// A method to solve `A x = b` with sparse A; a small value, whose memory is the [`Factorization`].
+/// A method to solve `A x = b` with sparse A; a small value, whose data are in the [`Factorization`].
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -46,23 +46,22 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait LinearSolver<T: Real>: std::fmt::Debug + Send {
-    /// Analyzes a pattern (both triangles) and allocates everything a factorization needs.
+    /// Analyzes a pattern (both triangles) and allocates all memory that a factorization needs.
     ///
-    /// `last` (ascending) are the dofs that contact may act on. A solver that eliminates them last, in this order or
-    /// any other, can offer [`Factorization::condensation`]; others ignore them.
+    /// `last` (ascending) are the dofs on which contact may act. A solver that eliminates them last, in any order,
+    /// can offer [`Factorization::condensation`]; others ignore them.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfMemory`], [`Error::Incompatible`] for a
-    /// pattern the solver cannot handle, and of the solvers of this crate [`Error::MissingDof`],
-    /// [`Error::RepeatedDof`] and [`Error::Incompatible`] for a list `last`
-    /// that names no dofs, a dof twice, or is not ascending.
+    /// [`Error::OutOfMemory`], [`Error::Incompatible`] for a pattern that the solver cannot handle; the solvers of
+    /// this crate also return [`Error::MissingDof`], [`Error::RepeatedDof`] and [`Error::Incompatible`] if `last`
+    /// names missing dofs, names a dof twice, or does not ascend.
     fn analyze(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize])
     -> Result<Box<dyn Factorization<T>>>;
 
-    /// Whether it solves for the rows of all [`Ranks`](crate::ranks::Ranks), each of which hands over its own. The
-    /// default is no: a run over ranks then refuses it, but for diagonal matrices. All methods of such a solver are
-    /// called by all ranks at the same time, and return an error on all of them if on one.
+    /// Whether it solves for the rows of all [`Ranks`](crate::ranks::Ranks), each of which passes its own rows.
+    /// Default: no; a run over ranks then rejects it, except for diagonal matrices. All ranks call all methods of
+    /// such a solver at the same time, and an error on one rank must be an error on all.
     fn spans_ranks(&self) -> bool {
         false
     }
@@ -82,33 +81,31 @@ impl<T: Real, L: LinearSolver<T> + ?Sized> LinearSolver<T> for Box<L> {
     }
 }
 
-/// The memory of a [`LinearSolver`] for one pattern; several may live at once.
+/// The data of a [`LinearSolver`] for one pattern; several may exist at once.
 pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Factorizes a matrix with the analyzed pattern.
     ///
     /// # Errors
     ///
-    /// [`Error::Singular`] with the failing dof, and of the solvers of this crate
-    /// [`Error::Dimension`] and [`Error::Incompatible`] for a matrix of another
-    /// size or pattern; the factorization is then unusable until the next success.
+    /// [`Error::Singular`] with the failing dof; the solvers of this crate also return [`Error::Dimension`] and
+    /// [`Error::Incompatible`] for a matrix of another size or pattern. The factorization is then unusable until the
+    /// next success.
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()>;
 
     /// Solves in place; `rhs` holds one or more columns of the system's size, one after the other.
     ///
-    /// Does not allocate for a single column. Call after a successful [`factorize`](Self::factorize) only. A right-hand
-    /// side that is not finite is no error: its solution is not finite either, which the step reports.
+    /// Does not allocate for a single column. Call only after a successful [`factorize`](Self::factorize). A
+    /// right-hand side that is not finite is no error: its solution is not finite either, and the step reports that.
     ///
     /// # Errors
     ///
-    /// [`Error::LinearNotConverged`] or
-    /// [`Error::Indefinite`] of an iteration, [`Error::Host`] or, if a smaller
-    /// step may help, [`Error::Inadmissible`] of a host's own solver. `rhs` then holds nothing of
-    /// use, and the step is undone. Direct factorizations do not fail here, but for [`Error::OutOfMemory`] on
-    /// several columns.
+    /// [`Error::LinearNotConverged`] or [`Error::Indefinite`] of an iteration; [`Error::Host`] or, if a smaller step
+    /// may help, [`Error::Inadmissible`] of a host's own solver. `rhs` is then undefined, and the step is undone.
+    /// Direct factorizations fail here only with [`Error::OutOfMemory`] for several columns.
     fn solve(&mut self, rhs: &mut [T]) -> Result<()>;
 
-    /// Frees what only factorizations need, where the matrix stays for long: the next one allocates it again. Default:
-    /// nothing is freed.
+    /// Frees memory that only factorizations need, for a matrix that stays unchanged for long; the next factorization
+    /// allocates it again. Default: frees no memory.
     fn release(&mut self) {}
 
     /// Number of stored values: the memory of the factor, in scalars.
@@ -119,18 +116,17 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
         0
     }
 
-    /// The factorization as a static condensation on the dofs given as `last`, if the solver offers it.
+    /// The factorization as a static condensation onto the dofs given as `last`, if the solver offers it.
     ///
-    /// With it a step in contact costs one sweep forward and one backward, as without contact, plus work on the
-    /// interface alone. Without it contact is solved with full solves: one for each contact that presses, and one more
-    /// a step.
+    /// With it a step in contact costs one forward and one backward sweep, as without contact, plus work on the
+    /// interface only. Without it contact needs full solves: one for each pressed contact, and one more per step.
     fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
         None
     }
 }
 
-/// Static condensation: `A x = b` with the interior eliminated, `S x_c = r_c` on the interface c, the dofs given as
-/// `last` to [`LinearSolver::analyze`].
+/// Static condensation: `A x = b` with the interior eliminated, `S x_c = r_c` on the interface c, which are the dofs
+/// given as `last` to [`LinearSolver::analyze`].
 ///
 /// Vectors on the interface have one entry for each of these dofs, in that order. S = A_cc − A_ci A_ii⁻¹ A_ic is the
 /// Schur complement; S⁻¹ is the block of A⁻¹ on the interface.
@@ -159,38 +155,38 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Condensation<T: Real> {
-    /// Eliminates the interior for a right-hand side, keeps what [`expand`](Self::expand) needs, and writes the
+    /// Eliminates the interior for a right-hand side, stores the data for [`expand`](Self::expand), and writes the
     /// solution on the interface. Does not allocate.
     ///
     /// # Errors
     ///
-    /// Those of [`Factorization::solve`], where a solver iterates, runs elsewhere, or has parts that do ([`ByBody`]
-    /// solves for bodies without contact with the solver that they were given). The step is then undone. The direct
-    /// factorizations of this crate fail in none of the three methods.
+    /// The errors of [`Factorization::solve`], if a solver iterates, runs elsewhere, or has parts that do ([`ByBody`]
+    /// solves for bodies without contact with their given solver). The step is then undone. The direct factorizations
+    /// of this crate never fail in these three methods.
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()>;
 
-    /// Completes the solution of the last [`condense`](Self::condense), with the interface values given (forces on the
-    /// interface may have changed them); they appear in `solution` bit for bit. Does not allocate.
+    /// Completes the solution of the last [`condense`](Self::condense) with the given interface values, which forces
+    /// on the interface may have changed; `solution` contains them bitwise. Does not allocate.
     ///
     /// # Errors
     ///
-    /// As [`condense`](Self::condense); `solution` then holds nothing of use.
+    /// As [`condense`](Self::condense); `solution` is then undefined.
     fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()>;
 
     /// `f ← S⁻¹ f` for one or more columns of forces on the interface. Does not allocate for up to 16 columns.
     ///
     /// # Errors
     ///
-    /// As [`condense`](Self::condense); `forces` then holds nothing of use.
+    /// As [`condense`](Self::condense); `forces` is then undefined.
     fn solve(&mut self, forces: &mut [T]) -> Result<()>;
 }
 
-/// Which of `count` parts each dof of a pattern belongs to. Nothing if the pattern is not symmetric, or too large.
+/// The part, of `count` parts, of each dof of a pattern; `None` if the pattern is not symmetric or too large.
 pub(crate) fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, count: usize) -> Result<Option<Vec<usize>>> {
     quotient::Quotient::new(pattern, &[])?.map(|quotient| dissection::parts(&quotient, count)).transpose()
 }
 
-/// Checks what is to be analyzed, and returns the number of dofs.
+/// Checks the input of an analysis and returns the number of dofs.
 fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
     let (dofs, what) = (sparse::check_effective_pattern(pattern)?, "the list of contact dofs");
     if let Some(&dof) = last.iter().find(|&&dof| dof >= dofs) {
@@ -203,8 +199,7 @@ fn check_analysis(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -
     }
 }
 
-/// A fingerprint of the analyzed pattern, to compare with that of a matrix; the pattern itself can be as large as a
-/// factor.
+/// A fingerprint of the analyzed pattern, to compare with a matrix; the pattern itself can be as large as a factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Fingerprint {
     dofs: usize,
@@ -214,7 +209,7 @@ struct Fingerprint {
 
 impl Fingerprint {
     fn of(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
-        // A hash that depends on the order: the odd factor mixes the bits, the rotation makes each place count.
+        // An order-dependent hash: the odd factor mixes the bits, the rotation makes each position matter.
         let mix = |mixed: u64, index: usize| (mixed.rotate_left(5) ^ index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let (mut entries, mut mixed) = (0, 0);
         for column in 0..pattern.ncols() {
@@ -225,7 +220,7 @@ impl Fingerprint {
         Self { dofs: pattern.ncols(), entries, mixed }
     }
 
-    /// Refuses a matrix with another pattern.
+    /// Rejects a matrix with another pattern.
     fn check<T: Real>(&self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         let what = "effective matrix";
         let found = sparse::square(what, a)?;
@@ -247,15 +242,15 @@ impl Fingerprint {
     }
 }
 
-/// Columns of forces on the interface that are solved for at once without allocating.
+/// Number of columns of interface forces that are solved at once without allocating.
 pub(crate) const COLUMNS: usize = 16;
 
-/// The solver that fits a pattern: [`Diagonal`] if there is no entry off the diagonal, [`Tridiagonal`] for strings with
-/// contact at one end each, else [`Cholesky`].
+/// Selects a solver by the pattern: [`Diagonal`] without off-diagonal entries, [`Tridiagonal`] for strings with
+/// contact at one end each, otherwise [`Cholesky`].
 ///
-/// Never [`ConjugateGradients`], whatever the size: which of the two is faster depends on the step and on how many
-/// contacts press, which a pattern does not show, and a factorization is exact to rounding at any step. Nor [`Lu`]: a
-/// pattern does not show whether the values are symmetric.
+/// It never selects [`ConjugateGradients`]: which of the two is faster depends on the step and on the number of
+/// pressed contacts, which a pattern does not determine, and a factorization is exact to rounding at any step. It
+/// never selects [`Lu`]: a pattern does not determine whether the values are symmetric.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Automatic;
 

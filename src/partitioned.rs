@@ -1,9 +1,9 @@
-//! Contact between bodies that live in codes of their own: the interface problem of localized Lagrange multipliers.
+//! Contact between bodies in separate codes: the interface problem of localized Lagrange multipliers.
 //!
-//! A body hands over what its contact dofs would do without contact, and its flexibility: what unit forces on them do.
-//! [`Frame`] joins two bodies whose contact nodes match, [`Assembly`] any number of bodies by rows with any weights:
-//! points where many bodies meet, faces whose nodes do not match. Both return forces; a body needs to know neither the
-//! others nor their codes.
+//! A body provides the motion of its contact dofs without contact, and its flexibility: their response to unit
+//! forces. [`Frame`] joins two bodies with matching contact nodes, [`Assembly`] any number of bodies by rows with any
+//! weights, such as points where many bodies meet, or faces whose nodes do not match. Both return forces; a body
+//! needs no knowledge of the others or their codes.
 
 mod assembly;
 mod coupling;

@@ -1,4 +1,4 @@
-//! Schemes, masses and corrections that go together, by name.
+//! Named combinations of scheme, mass and corrections.
 
 use crate::corrector::{Corrector, WorkBalance};
 use crate::error::{Error, Result};
@@ -8,13 +8,13 @@ use crate::real::Real;
 use crate::sparse::Combination;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 
-/// A time integrator and the mass matrix (and corrections, if any) that go with it.
+/// A time integrator with the matching mass matrix and corrections.
 ///
-/// What each buys and costs is measured in `docs/corrections.md`. Known bias: the mass of the contact dofs goes to the
-/// rest of the body, whose impedance it raises, and with it the force of lasting contact: by about 1/(3n) for n
-/// elements behind the contact, a third of a percent on bars of 100 (section 4 there), more on coarse meshes.
+/// `docs/corrections.md` measures benefits and costs. Known bias: moving the mass of the contact dofs to the rest of
+/// the body raises its impedance and the force of lasting contact, by about 1/(3n) for n elements behind the contact:
+/// a third of a percent on bars of 100 elements (section 4 there), more on coarse meshes.
 ///
-/// The mass is made once, from the consistent one:
+/// The mass is computed once from the consistent one:
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -52,31 +52,31 @@ enum Kind {
     Explicit,
 }
 
-/// The share of their mass that neighbors of massless contact dofs give away in a [`Preset`].
+/// The share of their mass that neighbors of massless contact dofs give away.
 const TAPER: f64 = 0.15;
 
 /// Spectral radius of the dissipative preset.
 const RADIUS: f64 = 0.9;
 
 impl Preset {
-    /// A smooth force at one solve a step: generalized-α of Chung and Hulbert with ρ∞ = 0.9, massless contact dofs, the
-    /// blend of masses whose dispersion makes up for the scheme's.
+    /// A smooth force with one solve per step: generalized-α of Chung and Hulbert with ρ∞ = 0.9, massless contact
+    /// dofs, and the blend of masses whose dispersion cancels the dispersion of the scheme.
     pub fn smooth() -> Self {
         Self(Kind::Smooth)
     }
 
-    /// The best energy over many bounces, with a force as smooth: Bathe's scheme without dissipation (ρ∞ = 1, two
-    /// solves a step) on the same mass.
+    /// The best energy over many bounces, with an equally smooth force: Bathe's scheme without dissipation (ρ∞ = 1,
+    /// two solves per step) with the same mass.
     pub fn conservative() -> Self {
         Self(Kind::Conservative)
     }
 
-    /// The cheapest step: central differences on a lumped mass, whose contact dofs have none: they follow the others
-    /// statically, so that nothing is stopped at first touch and impact costs no energy, at any Courant number up to 1.
-    /// The force overshoots the more the nearer that is to 1 (`docs/corrections.md` has figures): 0.9 is a good choice.
-    /// Nothing is factorized but the stiffness of the contact dofs among themselves, once. For linear systems whose
-    /// damping does not act on the contact dofs (proportional to mass); contact dofs with mass take [`CdLagrange`] on
-    /// [`mass::lump`] alone.
+    /// The cheapest step: central differences on a lumped mass with massless contact dofs. These follow the others
+    /// statically, so that first touch stops no mass and impact costs no energy, at any Courant number up to 1. The
+    /// force overshoots more the closer that number is to 1 (`docs/corrections.md` has figures): 0.9 is a good
+    /// choice. Only the stiffness of the contact dofs among themselves is factorized, once. For linear systems whose
+    /// damping does not act on the contact dofs (proportional to mass); for contact dofs with mass use [`CdLagrange`]
+    /// with [`mass::lump`] alone.
     pub fn explicit() -> Self {
         Self(Kind::Explicit)
     }
@@ -101,19 +101,18 @@ impl Preset {
     /// The mass matrix, from the consistent one.
     ///
     /// `contact` lists the dofs that become massless: those of the contact nodes, in the normal direction if it is
-    /// along an axis, otherwise in all; in all directions too where contacts have friction, for what has mass along the
-    /// surface rings there. `groups` are those of [`mass::redistribute`]: one number a body and direction.
-    /// `neighbors` is the pattern of the stiffness matrix. `courant` is that of the elements at the contact, c h/h_e
-    /// ([`mass::courant`] estimates it); the blend follows from it, up to the consistent mass.
+    /// along an axis, otherwise in all directions. With friction use all directions too, because mass along the
+    /// surface makes the friction force ring. `groups` are as in [`mass::redistribute`]: one number per body and
+    /// direction. `neighbors` is the pattern of the stiffness matrix. `courant` is the Courant number c h/h_e of the
+    /// elements at the contact ([`mass::courant`] estimates it); it determines the blend, up to the consistent mass.
     ///
-    /// For [`explicit`](Self::explicit) the mass is lumped, and a matrix with a diagonal pattern; the Courant number is
-    /// compared with 1 only.
+    /// For [`explicit`](Self::explicit) the mass is lumped, a matrix with a diagonal pattern; the Courant number is
+    /// only compared with 1.
     ///
     /// # Errors
     ///
     /// [`Error::Parameter`] for a Courant number that is negative or not finite, or above 1 for an explicit scheme;
-    /// those of
-    /// [`mass::lump`], [`mass::blend`] and [`mass::redistribute_consistent`].
+    /// the errors of [`mass::lump`], [`mass::blend`] and [`mass::redistribute_consistent`].
     pub fn mass<T: Real>(
         &self,
         consistent: SparseColMatRef<'_, usize, T>,
@@ -133,7 +132,7 @@ impl Preset {
             let mass = mass::redistribute(&lumped, contact, groups, by)?;
             return Ok(Combination::diagonal(mass.len(), &[], &[])?.into_matrix(mass));
         }
-        // (The schemes of the presets are of second order.)
+        // The schemes of the presets are of second order.
         let weight =
             mass::dispersion_weight(&self.integrator().tableau(), courant).map_or(0.5, |weight| weight.min(1.0));
         let blend = mass::blend(consistent, &lumped, weight)?;

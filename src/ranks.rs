@@ -1,4 +1,4 @@
-//! Bodies that are spread over ranks: what a parallel host adds to its system.
+//! Bodies spread over ranks: the interface of a parallel host.
 
 mod agreement;
 mod check;
@@ -17,37 +17,38 @@ use crate::error::Result;
 use crate::real::Real;
 use std::ops::Range;
 
-/// The ranks (processes, mostly) that a body is spread over, as a host's [`System::ranks`](crate::System::ranks)
-/// gives them. The crate knows no message passing: five methods are all that it asks for.
+/// The ranks (usually processes) over which a body is spread, returned by a host's
+/// [`System::ranks`](crate::System::ranks). The crate does no message passing itself: it only needs these five
+/// methods.
 ///
-/// **What each rank has.** Every rank builds a [`Simulation`](crate::Simulation) of its own, of the dofs that it knows,
-/// in numbers of its own: those that it *owns*, those of its neighbors that its elements touch, and all dofs that
-/// contact may ever act on. Each dof is owned by one rank. Contact is replicated: constraints, contact solver and
-/// correctors are the same on all ranks, the contact dofs come in the same order, and every rank solves the contact
-/// problem by itself, to the same bits.
+/// **Data of each rank.** Every rank builds its own [`Simulation`](crate::Simulation) from the dofs that it has, in
+/// its own numbering: the dofs that it *owns*, the dofs of neighboring ranks that its elements touch, and all dofs on
+/// which contact may ever act. Each dof is owned by one rank. Contact is replicated: constraints, contact solver and
+/// correctors are the same on all ranks, the contact dofs have the same order, and every rank solves the contact
+/// problem itself, with bitwise the same result.
 ///
-/// **What a host writes** has to be right where the rank owns the dof: forces of the [`System`](crate::System), and
-/// solutions of the [`LinearSolver`](crate::LinearSolver). The crate shares them, so that displacements, velocities and
-/// accelerations are right at every dof that a rank knows. Matrices are those of the elements that touch a dof of the
-/// rank's own (symmetric therefore, and right in the rows that it owns), a lumped mass is right where it is owned;
+/// **Data written by a host** must be correct on dofs that the rank owns: forces of the [`System`](crate::System),
+/// and solutions of the [`LinearSolver`](crate::LinearSolver). The crate shares them, so that displacements,
+/// velocities and accelerations are correct at every dof of a rank. Matrices contain the elements that touch an owned
+/// dof, so they are symmetric, and correct in owned rows; a lumped mass must be correct on owned dofs.
 /// [`System::potential_energy`](crate::System::potential_energy) is the rank's part of the sum.
 ///
-/// **Linear solvers** have to solve for the rows of all ranks ([`LinearSolver::spans_ranks`]); others are refused, but
-/// for diagonal matrices. What they return on the interface must be the same on all ranks to the bit.
+/// **Linear solvers** must solve for the rows of all ranks ([`LinearSolver::spans_ranks`]); others are rejected,
+/// except for diagonal matrices. Their results on the interface must be bitwise the same on all ranks.
 ///
-/// **Errors.** Before anything that waits for other ranks, and at the end of each step, all ranks agree that none has
-/// failed. If one has, the step fails on all and is undone: the rank returns its own error, the others
-/// [`Error::OtherRank`](crate::Error::OtherRank), which carries its words. A callback that waits for other ranks has
-/// to do so before it fails, for nobody waits for a rank that returned.
+/// **Errors.** Before any operation that waits for other ranks, and at the end of each step, all ranks check that
+/// none has failed. If one has, the step fails on all and is undone: the failed rank returns its own error, the
+/// others [`Error::OtherRank`](crate::Error::OtherRank) with its message. A callback that waits for other ranks must
+/// do so before it fails, because no rank waits for one that has returned.
 ///
-/// **All ranks call** what may wait: [`build`](crate::SimulationBuilder::build), steps and runs, changes of the step,
-/// [`energy`](crate::Simulation::energy), [`momentum`](crate::Simulation::momentum),
-/// [`reactions`](crate::Simulation::reactions). An observer sees its rank's state; one that stops or fails ends the run
-/// on all ranks.
+/// **Collective calls.** All ranks must make the calls that may wait: [`build`](crate::SimulationBuilder::build),
+/// steps and runs, changes of the step size, [`energy`](crate::Simulation::energy),
+/// [`momentum`](crate::Simulation::momentum), [`reactions`](crate::Simulation::reactions). An observer receives its
+/// rank's state; one that stops or fails ends the run on all ranks.
 ///
-/// What is not done over ranks: dofs without mass, and explicit steps without
-/// [`System::highest_frequency`](crate::System::highest_frequency) where Gershgorin's circles do not admit the step.
-/// Both are refused. `docs/ranks.md` says what ranks cost.
+/// Not supported over ranks, and rejected: dofs without mass, and explicit steps without
+/// [`System::highest_frequency`](crate::System::highest_frequency) that Gershgorin's circles do not admit.
+/// `docs/ranks.md` describes the cost of ranks.
 ///
 /// [`LinearSolver::spans_ranks`]: crate::LinearSolver::spans_ranks
 ///
@@ -84,25 +85,25 @@ pub trait Ranks<T: Real>: std::fmt::Debug + Send + Sync {
     /// The number of this rank, from 0.
     fn rank(&self) -> usize;
 
-    /// The dofs that this rank owns, as ascending ranges of its own numbers. They never change.
+    /// The dofs that this rank owns, as ascending ranges in its own numbering. They never change.
     fn owned(&self) -> &[Range<usize>];
 
-    /// Replaces each value by its sum over all ranks, the same on all of them to the bit. All ranks call it in the same
-    /// order and with as many values.
+    /// Replaces each value by its sum over all ranks, bitwise the same on all. All ranks call it in the same order
+    /// with the same number of values.
     ///
     /// # Errors
     ///
-    /// The host's own, if ranks cannot be reached; nothing is asked of them afterwards.
+    /// The host's own, if ranks cannot be reached; no further calls are made then.
     fn sum(&self, values: &mut [f64]) -> Result<()>;
 
-    /// Replaces each value by the largest over all ranks. Called as [`sum`](Self::sum).
+    /// Replaces each value by the largest over all ranks. Called like [`sum`](Self::sum).
     ///
     /// # Errors
     ///
     /// As [`sum`](Self::sum).
     fn max(&self, values: &mut [f64]) -> Result<()>;
 
-    /// Replaces the values of dofs that other ranks own (one value a dof of this rank) by those of their owners.
+    /// Replaces the values of dofs that other ranks own (one value per dof of this rank) by their owners' values.
     ///
     /// # Errors
     ///
@@ -119,7 +120,7 @@ mod tests {
         methods.map(|rest| rest.split(['(', '<']).next().unwrap().to_owned()).collect()
     }
 
-    /// A method that is new must not be answered by its default for a host that has one.
+    /// Wrappers must implement every method: a new method must not use its default if the host implements it.
     #[test]
     fn wrapped_parts_answer_every_method() {
         let (system, solver) = (include_str!("ranks/system.rs"), include_str!("ranks/solver.rs"));

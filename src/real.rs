@@ -1,4 +1,4 @@
-//! The scalar of a run, `f32` or `f64`, for which the kernels are compiled here, inside this crate.
+//! The scalar of a run, `f32` or `f64`, with kernels compiled for both inside this crate.
 //!
 //! A host's debug build would compile generic loops without optimization. Functions instantiated here stay fast with
 //! `[profile.dev.package.contact-dynamics] opt-level = 3`.
@@ -53,12 +53,12 @@ pub trait Kernels: Sized {
     fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N];
     /// `out += Σ c x` of several x of one length, in one pass.
     fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]);
-    /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether what was written is
+    /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; returns whether the written values are
     /// finite.
     fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
     /// Whether every entry is finite.
     fn all_finite(x: &[Self]) -> bool;
-    /// The largest |x|; NaN is passed over.
+    /// The largest |x|; NaN is ignored.
     fn largest(x: &[Self]) -> Self;
     /// `y += c A x`, any A.
     fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
@@ -66,7 +66,7 @@ pub trait Kernels: Sized {
     fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
     /// `y = c A x` or `y += c A x` for tridiagonal symmetric A.
     fn tridiagonal_product(c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
-    /// `y += c A x` with some columns of a symmetric A from the diagonal down, and their mirror images; `y` begins at
+    /// `y += c A x` with some columns of a symmetric A from the diagonal down, and their mirror images; `y` starts at
     /// the first of the columns.
     fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]);
     /// Factorizes a simplicial L D Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of
@@ -85,26 +85,26 @@ pub trait Kernels: Sized {
         values: &mut [Self],
         pivots: &mut [Self],
     ) -> Result<(), usize>;
-    /// What a thread needs to factorize a matrix with so many dofs; nothing if there is no memory.
+    /// The workspace of a thread for factorizing a matrix with this many dofs; `None` if there is no memory.
     fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>>;
     /// Solves in place for the columns of `rhs`, at most [`WIDEST`](interleaved_sweep::WIDEST), with a supernodal
-    /// factor. `order` lists the dofs as they are eliminated; `memory` is as large as [`room`](interleaved_sweep::room)
-    /// says.
+    /// factor. `order` lists the dofs in elimination order; `memory` has the size returned by
+    /// [`room`](interleaved_sweep::room).
     fn supernodal_solve(factor: &Supernodal<'_, Self>, order: Option<&[usize]>, rhs: &mut [Self], memory: &mut [Self]);
     /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
     fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
     /// The backward sweep over `columns`; entries behind them hold the solution.
     fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
-    /// Down two chains.
+    /// Forward along two chains.
     fn chains_forward(chains: Chains<'_, Self>);
-    /// Up two chains, from what is known behind them.
+    /// Backward along two chains, from the known values after them.
     fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]);
     /// The forward sweep over `columns` of a supernodal factor.
     fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
-    /// The backward sweep over `columns`; entries behind them hold the solution.
+    /// The backward sweep over `columns`; later entries hold the solution.
     fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
-    /// The forward sweep over the interior for one right-hand side `b`, of which each column finds its own entry
-    /// through `order`; `w` are the work vectors of the forest.
+    /// The forward sweep over the interior for one right-hand side `b`, whose entries are read through `order`; `w`
+    /// are the work vectors of the forest.
     fn forest_forward(
         factor: Supernodal<'_, Self>,
         forest: &Forest,
@@ -114,23 +114,23 @@ pub trait Kernels: Sized {
     );
     /// The backward sweep over the interior.
     fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]);
-    /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots
+    /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; returns whether all pivots
     /// were positive.
     fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool;
     /// Scratch for [`dense_cholesky`](Self::dense_cholesky).
     fn dense_cholesky_scratch(size: usize) -> StackReq;
     /// Solves L Lᵀ x = b in place.
     fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]);
-    /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which become their
-    /// inverses; `Err` is the dof of a pivot that is not positive.
+    /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which are replaced by
+    /// their inverses; `Err` is the dof of a pivot that is not positive.
     fn scale_blocks(
         size: usize,
         pattern: (&[usize], &[u32]),
         values: &mut [Self],
         diagonal: &mut [Self],
     ) -> Result<(), usize>;
-    /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; says whether all
-    /// pivots were positive.
+    /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; returns whether
+    /// all pivots were positive.
     fn incomplete_cholesky(
         size: usize,
         lower: &Blocks<'_, Self>,
@@ -153,7 +153,7 @@ pub trait Kernels: Sized {
         ends: (f64, usize),
         vectors: SideVectors<'_, Self>,
     ) -> [Outcome; LANES];
-    /// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
+    /// Factorizes with partial pivoting; the error has the failing column in the elimination order.
     fn lu(
         symbolic: &SymbolicLu<usize>,
         a: SparseColMatRef<'_, usize, Self>,

@@ -1,30 +1,30 @@
 //! Exact solutions to measure the schemes against.
 //!
 //! [`CollidingBars`] solves the central impact of two linear elastic bars, or of a bar and a rigid wall, by the
-//! method of characteristics; [`single_oscillator`] and [`forced_oscillator`] are the textbook responses of one degree
-//! of freedom; [`PowerLawImpact`] is Hertz' impact, [`BouncingBar`] an elastic bar that falls on a wall again and
-//! again. Units are the caller's and need only be consistent.
+//! method of characteristics; [`single_oscillator`] and [`forced_oscillator`] are the textbook responses of one
+//! degree of freedom; [`PowerLawImpact`] is Hertz' impact, [`BouncingBar`] an elastic bar that falls on a wall
+//! repeatedly. Units are the caller's and need only be consistent.
 //!
 //! # Method of characteristics
 //!
 //! With the compressive force `p = -sigma A` and the impedance `Z = rho c A`, `c = sqrt(E / rho)`, the wave equation
-//! of a bar says that `R = v + p/Z` travels unchanged to the right and `L = v - p/Z` to the left, at the speed `c`.
-//! Seen from the contact end, one of them comes in and the other goes out; the free far end (`p = 0`) turns the
-//! outgoing one into the incoming one, so that
+//! of a bar states that `R = v + p/Z` travels unchanged to the right and `L = v - p/Z` to the left, at the speed `c`.
+//! At the contact end, one of them arrives and the other leaves; the free far end (`p = 0`) reflects the outgoing one
+//! as the incoming one, so that
 //!
 //! ```math
 //! \text{incoming}(t) = \text{outgoing} \left( t - \frac{2l}{c} \right).
 //! ```
 //!
-//! The contact ends exchange nothing while they are apart. While they touch they share one velocity and one force:
+//! While apart, the contact ends are independent. While in contact they share one velocity and one force:
 //!
 //! ```math
 //! p = \frac{R_1 - L_2}{1/Z_1 + 1/Z_2}, \qquad v = R_1 - \frac{p}{Z_1} = L_2 + \frac{p}{Z_2}, \qquad p \ge 0,
 //! ```
 //!
-//! and they part as soon as this `p` would be negative; apart, the gap grows at the rate `L2 - R1`. A rigid wall is
-//! the limit `1/Z2 = 0`. Bars that start undeformed keep both invariants piecewise constant in time, so the solution
-//! is a finite list of jumps, and displacements, impulses and energies are exact sums over it.
+//! and they separate as soon as this `p` would be negative; while apart, the gap grows at the rate `L2 - R1`. A rigid
+//! wall is the limit `1/Z2 = 0`. Bars that start undeformed keep both invariants piecewise constant in time, so the
+//! solution is a finite list of jumps, and displacements, impulses and energies are exact sums over it.
 //!
 //! # References
 //!

@@ -1,4 +1,4 @@
-//! What the kernels ask of a scalar: the bounds, and the conversions from and to `f64`.
+//! Requirements of the kernels on a scalar: trait bounds, and conversions from and to `f64`.
 
 use faer::traits::RealField;
 use num_traits::{Float, NumAssign};

@@ -18,7 +18,7 @@ pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) 
     }
 }
 
-/// Refuses patterns with slack between columns or with rows out of order, on whose absence every loop here relies.
+/// Rejects patterns with slack between columns or with unsorted rows; every loop here relies on this.
 pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<()> {
     let refuse = |reason| Err(Error::Incompatible { part: format!("the {matrix} matrix"), reason });
     if pattern.col_nnz().is_some() {
@@ -31,8 +31,8 @@ pub(crate) fn check_pattern(matrix: &'static str, pattern: SymbolicSparseColMatR
     }
 }
 
-/// Refuses the pattern of an effective matrix that is not square, or that [`check_pattern`] refuses; returns the number
-/// of dofs.
+/// Rejects the pattern of an effective matrix that is not square or that [`check_pattern`] rejects; returns the
+/// number of dofs.
 pub(crate) fn check_effective_pattern(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<usize> {
     let (rows, columns) = (pattern.nrows(), pattern.ncols());
     if rows != columns {
@@ -42,7 +42,7 @@ pub(crate) fn check_effective_pattern(pattern: SymbolicSparseColMatRef<'_, usize
     Ok(columns)
 }
 
-/// Refuses NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
+/// Rejects NaN and infinity, and matrices that are not symmetric to rounding of their own entries.
 pub(crate) fn check_symmetric<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
     check_symmetric_in(matrix, a, &mut Vec::new())
 }
@@ -54,8 +54,8 @@ pub(crate) enum Symmetry {
     General,
 }
 
-/// Refuses NaN and infinity, and says whether the matrix is symmetric to rounding of its own entries. One with entries
-/// on one side of the diagonal alone is taken for half of a symmetric one, and refused.
+/// Rejects NaN and infinity, and returns whether the matrix is symmetric to rounding of its own entries. A matrix
+/// with entries on one side of the diagonal only is taken as half of a symmetric one and rejected.
 pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<Symmetry> {
     let stored = |side: fn(&usize, &usize) -> bool| {
         (0..a.ncols()).any(|column| a.row_idx_of_col_raw(column).iter().any(|row| side(row, &column)))
@@ -67,7 +67,7 @@ pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usi
     }
 }
 
-/// As [`check_symmetric`], with memory that is kept from one check to the next.
+/// As [`check_symmetric`], with memory kept between checks.
 pub(crate) fn check_symmetric_in<T: Real>(
     matrix: &'static str,
     a: SparseColMatRef<'_, usize, T>,
@@ -84,7 +84,8 @@ pub(crate) fn check_symmetric_in<T: Real>(
             largest = largest.max(value.abs());
         }
     }
-    // Assembly adds the same element entries in different orders: a few units in the last place of the largest entry.
+    // Assembly adds the same element entries in different orders: tolerate a few units in the last place of the
+    // largest entry.
     let tolerance = T::of(256.0) * T::epsilon() * largest;
     let mut worst = (tolerance, None);
     let mut compare = |row: usize, column: usize, value: T, mirrored: T| {
@@ -93,8 +94,8 @@ pub(crate) fn check_symmetric_in<T: Real>(
             worst = (difference, Some((row, column, value, mirrored)));
         }
     };
-    // Entries below the diagonal meet those of the upper triangle in ascending order: one cursor a column finds the
-    // partners.
+    // Entries below the diagonal match those of the upper triangle in ascending order: one cursor per column finds
+    // the partners.
     let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
     cursor.clear();
     cursor.extend_from_slice(&pointers[..n]);
@@ -140,7 +141,8 @@ pub(crate) fn scattered(index: usize) -> u64 {
     x ^ (x >> 31)
 }
 
-/// The same between ½ and 1 in size, with either sign: a vector of these has a part of every other one.
+/// The same with magnitude between ½ and 1 and either sign: such a vector has a component along almost every other
+/// one.
 pub(crate) fn scattered_signed(index: usize) -> f64 {
     let number = scattered(index);
     let size = 0.5 + (number >> 12) as f64 / (1_u64 << 53) as f64;
@@ -153,21 +155,21 @@ pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, colum
     rows.binary_search(&row).map_or(T::zero(), |at| a.val_of_col(column)[at])
 }
 
-/// Whether a source has this very pattern.
+/// Whether a source has exactly this pattern.
 fn kept_as_it_is(source: SymbolicSparseColMatRef<'_, usize>, pointers: &[usize], rows: &[usize]) -> bool {
     source.col_nnz().is_none() && source.col_ptr() == pointers && source.row_idx() == rows
 }
 
-/// A fixed pattern that holds weighted sums of several matrices, with rows and columns of some dofs replaced
-/// by those of the identity; entries are moved by precomputed slots.
+/// A fixed pattern for weighted sums of several matrices, with rows and columns of some dofs replaced by those of the
+/// identity; entries are copied through precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {
     /// Empty if it is [left to the first source](Self::leave_pattern).
     pattern: SymbolicSparseColMat<usize>,
     /// Number of its entries.
     entries: usize,
-    /// For each source, the slot of each of its entries, `DROPPED` on the rows and columns left out; none where a
-    /// source has this pattern itself, as a stiffness matrix without supports does.
+    /// For each source the slot of each of its entries, `DROPPED` in removed rows and columns; `None` if the source
+    /// has the same pattern, like a stiffness matrix without supports.
     slots: Vec<Option<Vec<usize>>>,
     diagonal: Vec<usize>,
     identity: Vec<usize>,
@@ -181,7 +183,7 @@ impl Combination {
         Self::within(n, identity, sources, sources)
     }
 
-    /// The diagonal alone: other entries of the sources are dropped.
+    /// The diagonal only: other entries of the sources are dropped.
     pub(crate) fn diagonal(
         n: usize,
         identity: &[usize],
@@ -199,7 +201,7 @@ impl Combination {
     ) -> Result<Self> {
         let kept = |dof: &usize| identity.binary_search(dof).is_err();
         let mut pointers = Vec::with_capacity(n + 1);
-        // (A vector that grew would hold up to twice the memory.)
+        // A growing vector would use up to twice the memory.
         let size = patterns.iter().map(|source| source.row_idx().len()).max().map_or(n, |entries| entries + n);
         let mut rows: Vec<usize> = memory::reserve(size, 1, "the pattern of the effective matrix")?;
         let mut column_rows: Vec<usize> = Vec::new();
@@ -244,14 +246,14 @@ impl Combination {
         Ok(Self { pattern, entries, slots, diagonal, identity: identity.to_vec() })
     }
 
-    /// Frees a pattern that is that of the first source, which is then given to [`shape`](Self::shape).
+    /// Frees a pattern equal to the first source's, which is then passed to [`shape`](Self::shape).
     pub(crate) fn leave_pattern(&mut self) {
         if let Some(None) = self.slots.first() {
             self.pattern = SymbolicSparseColMat::new_checked(0, 0, vec![0], None, Vec::new());
         }
     }
 
-    /// The pattern; `first` is that of the first source, if there is one.
+    /// The pattern; `first` is the pattern of the first source, if there is one.
     pub(crate) fn shape<'p>(&'p self, first: SymbolicSparseColMatRef<'p, usize>) -> SymbolicSparseColMatRef<'p, usize> {
         if self.pattern.row_idx().len() < self.entries { first } else { self.pattern.as_ref() }
     }
@@ -274,7 +276,7 @@ impl Combination {
         SparseColMat::new(self.pattern, values)
     }
 
-    /// Refuses sources (and a diagonal) of another size than they had when the pattern was made, each with its name.
+    /// Rejects sources, and a diagonal, whose sizes differ from those of the pattern; each source has its name.
     pub(crate) fn check(
         &self,
         diagonal: usize,
@@ -304,7 +306,7 @@ impl Combination {
         Ok(())
     }
 
-    /// `out = Σ weight · source (+ weight · diag)`, identity on the rows left out.
+    /// `out = Σ weight · source (+ weight · diag)`, identity in the removed rows.
     pub(crate) fn fill<T: Real>(&self, sources: &[(T, &[T])], diagonal: Option<(T, &[T])>, out: &mut [T]) {
         out.fill(T::zero());
         for (slots, (weight, values)) in self.slots.iter().zip(sources) {
@@ -373,7 +375,7 @@ mod tests {
         let dense: Vec<Vec<f64>> = (0..3).map(|i| (0..3).map(|j| entry(a, i, j)).collect()).collect();
         assert_eq!(dense, [[14.0, 0.0, 5.0], [0.0, 1.0, 0.0], [5.0, 0.0, 12.0]]);
 
-        // K alone without supports has the pattern of the sum; C alone has not.
+        // Without supports K alone has the pattern of the sum; C alone does not.
         let own = Combination::new(3, &[], &[k.symbolic()]).unwrap();
         assert!(own.slots[0].is_none() && sum.slots.iter().all(Option::is_some));
         let mut values = vec![0.0; own.len()];

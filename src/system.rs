@@ -1,4 +1,4 @@
-//! The host's mechanics: mass, force, tangent and supports.
+//! The mechanical system of the host: mass, force, tangent and supports.
 
 mod forces;
 mod linear;
@@ -14,11 +14,11 @@ use crate::sparse;
 use faer::sparse::SymbolicSparseColMatRef;
 use std::sync::Arc;
 
-/// How the force of a system depends on displacements and velocities.
+/// Dependence of the force of a system on displacements and velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Linearity {
-    /// f = F(t) − K u − C v with constant K and C: one factorization for a run, one solve a stage.
+    /// f = F(t) − K u − C v with constant K and C: one factorization per run, one solve per stage.
     Linear,
     /// Anything else: each stage is solved by Newton's method.
     Nonlinear,
@@ -26,20 +26,20 @@ pub enum Linearity {
 
 /// A mechanical system `M a = f(t, u, v) + Gᵀ λ`, with f the external minus the internal force.
 ///
-/// Vectors have full length, supports included; the solver reads prescribed dofs from [`prescribed`](Self::prescribed)
-/// and never solves for them. Evaluations are pure: they may use scratch, but two calls with the same arguments give
-/// the same result; only [`commit`](Self::commit) moves history. M is constant and symmetric. A tangent that is not
-/// symmetric takes
-/// [`Lu`](crate::Lu) as the linear solver; the default one refuses it.
+/// Vectors have full length, including supports; the solver reads prescribed dofs from
+/// [`prescribed`](Self::prescribed) and never solves for them. Evaluations are pure: they may use scratch, but two
+/// calls with the same arguments give the same result; only [`commit`](Self::commit) changes history variables. M is
+/// constant and symmetric. An unsymmetric tangent needs [`Lu`](crate::Lu) as the linear solver; the default one
+/// rejects it.
 ///
-/// A host writes five methods: [`dofs`](Self::dofs), [`mass`](Self::mass), [`force`](Self::force),
-/// [`pattern`](Self::pattern) and [`tangent`](Self::tangent) (compared with differences of the force by
-/// [`verify::tangent`](crate::verify::tangent)); the others have defaults. `&mut S` is a system too, so a host lends
-/// its model. Hosts with constant matrices take [`LinearSystem`].
+/// A host implements five methods: [`dofs`](Self::dofs), [`mass`](Self::mass), [`force`](Self::force),
+/// [`pattern`](Self::pattern) and [`tangent`](Self::tangent) ([`verify::tangent`](crate::verify::tangent) compares
+/// the last with differences of the force); the others have defaults. `&mut S` is a system too, so a host can lend
+/// its model. Hosts with constant matrices should use [`LinearSystem`].
 ///
-/// A force that cannot be evaluated at a trial state, because an element is turned inside out for instance, is
+/// If a force cannot be evaluated at a trial state, for instance because an element is turned inside out, return
 /// [`Error::Inadmissible`](crate::Error::Inadmissible) with the name of the method as its `callback`: the step is
-/// undone, and may be taken again with a smaller h.
+/// undone and may be repeated with a smaller h.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -81,66 +81,66 @@ pub enum Linearity {
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub trait System<T: Real>: Send {
-    /// Number of degrees of freedom, prescribed ones included.
+    /// Number of dofs, including prescribed ones.
     fn dofs(&self) -> usize;
 
-    /// How the force depends on u and v. A nonlinear system must not be declared linear; a linear one that is declared
+    /// How the force depends on u and v. A nonlinear system must not be declared linear; a linear one declared
     /// nonlinear only takes more time.
     fn linearity(&self) -> Linearity {
         Linearity::Nonlinear
     }
 
-    /// The mass matrix (constant), not negative. Prescribed dofs may have none, other dofs with schemes that take it
-    /// ([`massless_factor`](crate::analysis::massless_factor); of the explicit ones central differences and
-    /// Noh–Bathe's, for linear systems).
+    /// The (constant) mass matrix, positive semidefinite. Prescribed dofs may have no mass; other dofs may have none
+    /// in schemes that support it ([`massless_factor`](crate::analysis::massless_factor); among the explicit ones
+    /// central differences and Noh–Bathe's, for linear systems).
     fn mass(&self) -> Mass<'_, T>;
 
-    /// `out = f(t, u, v)`: external minus internal force, `out` holding anything on entry.
+    /// `out = f(t, u, v)`: external minus internal force; `out` is undefined on entry.
     ///
     /// # Errors
     ///
-    /// [`Error::Inadmissible`](crate::Error::Inadmissible) if a smaller step may help, else
+    /// [`Error::Inadmissible`](crate::Error::Inadmissible) if a smaller step may help, otherwise
     /// [`Error::Host`](crate::Error::Host); the `callback` of either is the name of the method, here `"force"`.
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()>;
 
-    /// Pattern of K and C together, both triangles (not necessarily of one shape, for [`Lu`](crate::Lu)), rows sorted
-    /// in each column; it never changes.
+    /// Pattern of K and C together, with both triangles, which need not have the same shape with [`Lu`](crate::Lu);
+    /// rows are sorted in each column, and the pattern never changes.
     fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize>;
 
-    /// `out = weights.stiffness K + weights.damping C` at (t, u, v), with K = −∂f/∂u and C = −∂f/∂v: the values of the
-    /// pattern in its order, `out` holding anything on entry.
+    /// `out = weights.stiffness K + weights.damping C` at (t, u, v), with K = −∂f/∂u and C = −∂f/∂v: the values in
+    /// the order of the pattern; `out` is undefined on entry.
     ///
     /// # Errors
     ///
     /// As [`force`](Self::force).
     fn tangent(&mut self, t: f64, u: &[T], v: &[T], weights: TangentWeights<T>, out: &mut [T]) -> Result<()>;
 
-    /// A force of its own along paths, if the system has one, for [`EnergyMomentum`](crate::EnergyMomentum). Default:
-    /// none; the forces at start, middle and end are then averaged by the potential. Whether there is one must not
-    /// change during a run.
+    /// The system's own force along paths, if it has one, for [`EnergyMomentum`](crate::EnergyMomentum). Default: none;
+    /// the forces at start, middle and end are then averaged using the potential. Whether it exists must not change
+    /// during a run.
     fn path_force(&mut self) -> Option<&mut dyn PathForce<T>> {
         None
     }
 
-    /// The damping force, if the system has one. The default is no damping. The energy balance and corrections of
-    /// velocity read it; schemes, corrections and explicit steps are checked for damping by it. Whether there is one
-    /// must not change during a run.
+    /// The damping force, if the system has one; default: no damping. The energy balance and velocity corrections
+    /// read it; schemes, corrections and explicit steps are checked for damping with it. Whether it exists must not
+    /// change during a run.
     fn damping_force(&mut self) -> Option<&mut dyn DampingForce<T>> {
         None
     }
 
-    /// Elastic energy (½ uᵀ K u if it is linear), if the system has one; none by default. The potential of loads is not
-    /// part of it. Internal forces whose K is not symmetric have no potential: return none, so that the energy balance
+    /// Elastic energy (½ uᵀ K u if linear), if the system has one; none by default. It does not include the potential
+    /// of loads. Internal forces with an unsymmetric K have no potential: return none, so that the energy balance
     /// does not count their work as energy.
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let _ = u;
         None
     }
 
-    /// `out =` the part of the force that depends on t alone, for the energy balance and for
+    /// `out =` the part of the force that depends on t only, for the energy balance and for
     /// [`EnergyMomentum`](crate::EnergyMomentum) without [`path_force`](Self::path_force); [`force`](Self::force)
-    /// contains it. The default is no load. Loads that depend on u are not part of this; the energy balance counts
-    /// their work in its remainder. `EnergyMomentum` would take them for internal forces; with such loads implement
+    /// contains it. Default: no load. Loads that depend on u are not included; the energy balance counts their work
+    /// in its remainder. `EnergyMomentum` would treat them as internal forces; with such loads implement
     /// [`path_force`](Self::path_force).
     ///
     /// # Errors
@@ -152,21 +152,21 @@ pub trait System<T: Real>: Send {
         Ok(())
     }
 
-    /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or a bound above it, if the host knows one;
-    /// none by default. Explicit schemes are refused beyond the step that it allows. Without it the frequency is
-    /// estimated when a simulation is built: from the tangent, or for an empty [`pattern`](Self::pattern) by
-    /// differences of the force, some evaluations of which this saves.
+    /// The highest circular frequency ω of M⁻¹ K on the free dofs (1/time), or an upper bound, if the host knows one;
+    /// none by default. Explicit schemes reject larger steps than it allows. Without it the frequency is estimated
+    /// when a simulation is built: from the tangent, or for an empty [`pattern`](Self::pattern) from differences of
+    /// the force, which needs several evaluations.
     fn highest_frequency(&mut self) -> Option<f64> {
         None
     }
 
-    /// The ranks that the system is spread over; none by default. What the other methods have to give then is said by
-    /// [`Ranks`].
+    /// The ranks over which the system is spread; none by default. [`Ranks`] describes what the other methods must
+    /// then return.
     fn ranks(&self) -> Option<Arc<dyn Ranks<T>>> {
         None
     }
 
-    /// Degrees of freedom whose motion is given, ascending.
+    /// Prescribed dofs, ascending.
     fn prescribed(&self) -> &[usize] {
         &[]
     }
@@ -183,7 +183,7 @@ pub trait System<T: Real>: Send {
         Ok(())
     }
 
-    /// Accepts the step that ends at t: history variables of the host move here and nowhere else.
+    /// Accepts the step that ends at t: the only place where the host updates its history variables.
     ///
     /// # Errors
     ///
@@ -194,7 +194,7 @@ pub trait System<T: Real>: Send {
     }
 }
 
-/// Refuses a system whose mass or pattern do not fit its number of dofs, which is returned.
+/// Rejects a system whose mass or pattern does not fit its number of dofs, which is returned.
 pub(crate) fn check_sizes<T: Real>(system: &dyn System<T>) -> Result<usize> {
     let dofs = system.dofs();
     if dofs == 0 {
@@ -218,7 +218,7 @@ pub(crate) fn check_sizes<T: Real>(system: &dyn System<T>) -> Result<usize> {
     Ok(dofs)
 }
 
-/// Refuses a vector of another length than `dofs`, and NaN or infinity in it.
+/// Rejects a vector of another length than `dofs`, and NaN or infinity in it.
 pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
     if values.len() != dofs {
         return Err(Error::Dimension { what, expected: dofs, found: values.len() });
@@ -229,7 +229,8 @@ pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usiz
     }
 }
 
-/// Pointers to systems are systems: `&mut S` lends the host's model, `Box<dyn System<T>>` is chosen at run time.
+/// Pointers to systems are systems: `&mut S` lends the host's model, `Box<dyn System<T>>` allows a choice at run
+/// time.
 macro_rules! forward {
     ($($pointer:ty),*) => {$(
         impl<T: Real, S: System<T> + ?Sized> System<T> for $pointer {

@@ -1,4 +1,4 @@
-//! The algebra of time-integration rows: a scheme is a table of affine rows, everything else is derived from it.
+//! The algebra of time-integration rows: a scheme is a table of affine rows from which all else is derived.
 //!
 //! With z the unknown of a stage and past states k = 0 (newest), 1, 2 …, a [`Row`] is
 //!
@@ -23,25 +23,26 @@ pub use stage::{ContactLevel, Stage, StageForce};
 
 use crate::error::{Error, Result};
 
-/// How the past that a multistep scheme reads is made at the start.
+/// How the past states of a multistep scheme are initialized.
 ///
-/// From free flight (no acceleration) the straight line is exact, and both forms use it.
+/// In free flight (no acceleration) the straight line is exact, and both forms use it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StartUp {
-    /// The first steps are trapezoidal, until the past is known: no overshoot of stiff modes, one more factorization.
+    /// The first steps are trapezoidal until the past is known: no overshoot of stiff modes, one more factorization.
     #[default]
     Trapezoidal,
-    /// The past is Taylor's expansion of the start, u₀ − k h v₀ + ½ (k h)² a₀, v₀ − k h a₀, a₀: contact and corrections
-    /// act by the scheme's own rows from the first step; a stiff mode that starts out of equilibrium overshoots.
+    /// The past is the Taylor expansion at the start, u₀ − k h v₀ + ½ (k h)² a₀, v₀ − k h a₀, a₀: contact and
+    /// corrections use the scheme's own rows from the first step; a stiff mode that starts out of equilibrium
+    /// overshoots.
     Taylor,
 }
 
 /// A time-integration scheme as data: its stages.
 ///
-/// u of the last stage is the displacement at the end of the step. Stored v and a may live elsewhere, as the
-/// accelerations of generalized-α do: [`analysis::order`](crate::analysis::order) finds out where.
+/// u of the last stage is the displacement at the end of the step. Stored v and a may belong to another time, like
+/// the accelerations of generalized-α: [`analysis::order`](crate::analysis::order) computes it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Tableau {
@@ -61,13 +62,13 @@ impl Tableau {
         Self { stages }
     }
 
-    /// Refuses tableaux that no step could be made of.
+    /// Rejects tableaux that define no step.
     ///
     /// # Errors
     ///
-    /// [`Error::Tableau`] names the stage and what is wrong: no stage, a coefficient that is not finite, or from which
-    /// one follows that is not, an acceleration row without the unknown, contact imposed before the stage's state, a
-    /// forecast of contact that reads the unknown, or a last stage that does not end at the end of the step.
+    /// [`Error::Tableau`] names the stage and the defect: no stage, a coefficient (or one computed from it) that is
+    /// not finite, an acceleration row without the unknown, contact imposed before the stage's state, a contact
+    /// forecast that reads the unknown, or a last stage that does not end at the end of the step.
     pub fn check(&self, integrator: &str) -> Result<()> {
         let refuse = |stage, reason| Err(Error::Tableau { integrator: integrator.to_owned(), stage, reason });
         for (s, stage) in self.stages.iter().enumerate() {
@@ -87,7 +88,7 @@ impl Tableau {
             if stage.recovery.a.z == 0.0 || stage.balance.a.z == 0.0 {
                 return refuse(s, "the acceleration rows must contain the unknown");
             }
-            // What steps are made of: rows over the increment of the unknown, and where contact is imposed.
+            // Steps use rows over the increment of the unknown, and the time at which contact is imposed.
             let increment = stage.increment();
             if !increment.rows().iter().all(Row::is_finite) || !increment.contact_row().is_finite() {
                 return refuse(s, "a coefficient that follows from its rows is not finite");
@@ -102,14 +103,14 @@ impl Tableau {
         }
     }
 
-    /// Number of states, the current one included, that a step reads at its start (at least 1).
+    /// Number of states, including the current one, that a step reads at its start (at least 1).
     pub fn depth(&self) -> usize {
         let read =
             |(s, stage): (usize, &Stage)| stage.rows().iter().map(Row::depth).max().unwrap_or(0).saturating_sub(s);
         self.stages.iter().enumerate().map(read).max().unwrap_or(0).max(1)
     }
 
-    /// Which entries of the past are still read after stage `s`: `[k][field]`, k = 0 the state of that stage.
+    /// Entries of the past that are still read after stage `s`: `[k][field]`, k = 0 the state of that stage.
     ///
     /// # Errors
     ///
@@ -121,11 +122,11 @@ impl Tableau {
         }
     }
 
-    /// [`read_after`](Self::read_after) of a stage that exists.
+    /// [`read_after`](Self::read_after) for an existing stage.
     pub(crate) fn reads_after(&self, s: usize) -> Vec<[bool; 3]> {
         let (stages, depth) = (self.stages.len(), self.depth());
         let mut read = vec![[false; 3]; depth + stages];
-        // In increment form: what cancels is not read.
+        // In increment form: cancelling terms are not read.
         let mut mark = |stage: &Stage, entry: &dyn Fn(usize) -> Option<usize>| {
             let stage = stage.increment();
             for row in stage.rows() {
@@ -143,8 +144,8 @@ impl Tableau {
             mark(stage, &|k| k.checked_sub(later - s - 1));
         }
         for (next, stage) in self.stages.iter().enumerate() {
-            // State k of the next step's stage `next`: its own stages first, then the newest state, then the past of
-            // t_n, which after stage s lies behind the s + 1 states of this step.
+            // State k of stage `next` of the next step: its own stages first, then the newest state, then the past of
+            // t_n, which after stage s follows the s + 1 states of this step.
             let place = |k: usize| match k.checked_sub(next) {
                 None => None,
                 Some(0) => (s + 1 == stages).then_some(0),
@@ -155,9 +156,9 @@ impl Tableau {
         read
     }
 
-    /// The map of one stage on the scalar test equation `inertia a + damping v + stiffness u = 0` with the weights
-    /// [stiffness, damping, inertia] in units of the step (Ω², 2 ξ Ω, 1): new (U, V, A) from the past, row by row over
-    /// `width` past states.
+    /// The map of one stage for the scalar test equation `inertia a + damping v + stiffness u = 0` with the weights
+    /// [stiffness, damping, inertia] in units of the step (Ω², 2 ξ Ω, 1): new (U, V, A) from the past, row by row
+    /// over `width` past states.
     pub(crate) fn stage_map(stage: &Stage, weights: [f64; 3], width: usize) -> [Vec<f64>; 3] {
         let [stiffness, damping, inertia] = weights;
         let stage = stage.increment();
@@ -172,8 +173,9 @@ impl Tableau {
         stage.recovery.each().map(|row| combine(row).iter().zip(&d).map(|(c, d)| c + row.z * d).collect())
     }
 
-    /// The amplification matrix of one step on the scalar test equation, row-major, over the past states of the step:
-    /// (U, V, A) of the newest, of the one before, …. The weights are those of [`stage_map`](Self::stage_map).
+    /// The amplification matrix of one step for the scalar test equation, row-major, over the past states of the
+    /// step: (U, V, A) of the newest state, then of the earlier ones. The weights are the same as for
+    /// [`stage_map`](Self::stage_map).
     pub(crate) fn step_map(&self, weights: [f64; 3]) -> Vec<Vec<f64>> {
         let (depth, stages) = (self.depth(), self.stages.len());
         let size = 3 * depth;
@@ -192,7 +194,7 @@ impl Tableau {
             });
             past.splice(0..0, new);
         }
-        // (Without a stage a step does nothing: there is no state between to drop.)
+        // A step without stages has no intermediate states to drop.
         past.drain(3..3 * stages.max(1));
         past.truncate(size);
         past

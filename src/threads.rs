@@ -2,32 +2,32 @@
 
 use std::sync::{Mutex, PoisonError};
 
-/// The smallest factor, in scalars, that is worth a thread of its own: reading it takes a tenth of a millisecond.
+/// The smallest factor, in scalars, that gets a thread of its own: reading it takes a tenth of a millisecond.
 pub(crate) const GRAIN: usize = 1 << 18;
 
-/// Runs both, on two threads if the current pool has them, else one after the other.
+/// Runs both, on two threads if the current pool has them, otherwise in sequence.
 #[cfg(feature = "rayon")]
 pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     rayon::join(first, second);
 }
 
-/// Runs both, one after the other.
+/// Runs both in sequence.
 #[cfg(not(feature = "rayon"))]
 pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     first();
     second();
 }
 
-/// How many threads may share some work.
+/// Number of threads that may share some work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Threads {
-    /// The one that is there.
+    /// The present thread only.
     One,
     /// All of the current pool.
     All,
 }
 
-/// Runs both, on so many threads.
+/// Runs both, on the given threads.
 pub(crate) fn join_by(threads: Threads, first: impl FnOnce() + Send, second: impl FnOnce() + Send) {
     match threads {
         Threads::All => join(first, second),
@@ -38,7 +38,7 @@ pub(crate) fn join_by(threads: Threads, first: impl FnOnce() + Send, second: imp
     }
 }
 
-/// Calls `act` with the number and the entries of each chunk of so many entries; the last one may have fewer.
+/// Calls `act` with the number and the entries of each chunk of `length` entries; the last one may be shorter.
 pub(crate) fn each_chunk<T: Send>(
     threads: Threads,
     values: &mut [T],
@@ -64,17 +64,17 @@ pub(crate) fn each_chunk<T: Send>(
 pub(crate) struct PerThread<W>(Vec<Mutex<W>>);
 
 impl<W> PerThread<W> {
-    /// One for each thread of the current pool; nothing if `make` fails.
+    /// One workspace for each thread of the current pool; `None` if `make` fails.
     pub(crate) fn new(make: impl FnMut() -> Option<W>) -> Option<Self> {
         let made: Option<Vec<W>> = std::iter::repeat_with(make).take(count()).collect();
         made.map(|made| Self(made.into_iter().map(Mutex::new).collect()))
     }
 
-    /// Lends one to the present thread. In a larger pool than that of [`new`](Self::new) threads may wait for each
-    /// other, so `act` must not wait for other threads, nor borrow again.
+    /// Lends one to the present thread. In a pool larger than the pool of [`new`](Self::new) threads may wait for
+    /// each other, so `act` must not wait for other threads, nor borrow again.
     pub(crate) fn with<R>(&self, act: impl FnOnce(&mut W) -> R) -> R {
         let workspace = &self.0[index() % self.0.len()];
-        // What a panic left there is overwritten.
+        // Data left by a panic are overwritten.
         act(&mut workspace.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -101,12 +101,12 @@ fn index() -> usize {
     0
 }
 
-/// Whether two or more of the parts, whose factors have these sizes in scalars, are worth a thread each.
+/// Whether at least two of the parts, whose factors have these sizes in scalars, deserve a thread each.
 pub(crate) fn worthwhile(scalars: impl Iterator<Item = usize>) -> bool {
     cfg!(feature = "rayon") && scalars.filter(|scalars| *scalars >= GRAIN).count() > 1
 }
 
-/// Calls `act` on every part, on several threads. Of several errors that of the first part in order is returned.
+/// Calls `act` on every part, on several threads. Returns the error of the first failing part in order.
 pub(crate) fn try_each<P: Send, E: Send>(
     parts: &mut [P],
     act: &(impl Fn(&mut P) -> Result<(), E> + Sync),

@@ -1,4 +1,4 @@
-//! Checks for the parts a host writes itself.
+//! Checks of parts that a host implements.
 
 mod gap_jacobian;
 mod tangent;

@@ -5,10 +5,10 @@ use super::order::{Order, order};
 use crate::tableau::Tableau;
 use faer::c64;
 
-/// Ω at which the error is taken: terms of higher order are smaller by Ω².
+/// Ω at which the error is evaluated: terms of higher order are smaller by Ω².
 const OMEGA: f64 = 0.02;
 
-/// How the error that a step adds follows from its distance to Taylor's expansion,
+/// Relation between the error that a step adds and its distance from the Taylor expansion,
 ///
 /// ```text
 /// e = factor · max( |u' − u − h v − ½ h² a| , h |v' − v − h a| ),
@@ -20,16 +20,16 @@ const OMEGA: f64 = 0.02;
 pub struct LocalError {
     /// p + 1: e falls with this power of h.
     pub power: u32,
-    /// Error of a step over the distance, for small h.
+    /// Error of a step divided by the distance, for small h.
     pub factor: f64,
 }
 
-/// The local error of a scheme, from a free oscillation at small Ω: the error that a step adds to it is that of its
-/// principal root, and the distance that of its principal vector, so the effect of earlier steps on v and a is
+/// The local error of a scheme, from a free oscillation at small Ω: the error added per step is the error of the
+/// principal root, and the distance is that of its principal vector, so the effect of earlier steps on v and a is
 /// included.
 ///
-/// `None` if the error does not follow the distance: schemes of first order like Newmark's with γ ≠ ½ err in v by h²,
-/// of which h v shows h³ only.
+/// `None` if the error is not proportional to the distance: first-order schemes like Newmark's with γ ≠ ½ have an
+/// error of h² in v, of which h v contains only h³.
 ///
 /// ```
 /// use contact_dynamics::{Newmark, TimeIntegrator, analysis};
@@ -44,7 +44,7 @@ pub fn local_error(tableau: &Tableau) -> Option<LocalError> {
     (factor > 0.0 && (finer / factor - 1.0).abs() < 0.05).then_some(error)
 }
 
-/// Error over distance at Ω.
+/// Error divided by distance at Ω.
 fn factor(tableau: &Tableau, order: &Order, omega: f64) -> Option<f64> {
     let eigen = amplification(tableau, omega, 0.0).eigen().ok()?;
     let (roots, vectors) = (eigen.S(), eigen.U());

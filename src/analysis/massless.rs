@@ -2,15 +2,14 @@
 
 use crate::tableau::Tableau;
 
-/// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic, 0
-/// = f(ū), and ū = α u + (1 − α) u₀ carries an error of u₀ over by −(1 − α)/α. `None` if the displacement of such a dof
-/// is not determined (explicit schemes), or not by that of the previous state alone.
+/// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic,
+/// 0 = f(ū), and ū = α u + (1 − α) u₀ multiplies an error of u₀ by −(1 − α)/α. `None` if the displacement of such a
+/// dof is not determined (explicit schemes), or depends on more than the displacement of the previous state.
 ///
-/// Below 1 in size errors decay, and a [`Simulation`](crate::Simulation) takes dofs without mass; at 1 they alternate
-/// forever. Explicit stages whose displacements are known before their balance bring such dofs into static balance
-/// there, and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f) for
-/// generalized-α (theory, section 15).
-///
+/// If its magnitude is below 1, errors decay, and a [`Simulation`](crate::Simulation) accepts dofs without mass; at 1
+/// they alternate forever. Explicit stages whose displacements are known before their balance bring such dofs into
+/// static balance and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f)
+/// for generalized-α (theory, section 15).
 /// ```
 /// use contact_dynamics::{CentralDifference, GeneralizedAlpha, MoreauJean, Newmark, TimeIntegrator, analysis};
 /// assert_eq!(analysis::massless_factor(&Newmark::trapezoidal().tableau()), Some(0.0));
@@ -35,18 +34,17 @@ pub fn massless_factor(tableau: &Tableau) -> Option<f64> {
     tableau.stages.iter().map(factor).try_fold(1.0, |product, factor| Some(product * factor?))
 }
 
-/// Whether every stage of a scheme knows its displacements before its forces, and balances forces at these
-/// displacements: dofs without mass can then be brought into static balance with the others, before anything else of
-/// the stage is solved.
+/// Whether every stage of a scheme knows its displacements before its forces and balances forces at these
+/// displacements: dofs without mass can then be brought into static balance before the rest of the stage is solved.
 pub(crate) fn massless_follow(tableau: &Tableau) -> bool {
     tableau.stages.iter().all(|stage| {
         stage.recovery.u.z == 0.0 && stage.balance.u == stage.recovery.u && (stage.load - stage.end).abs() < 1e-12
     })
 }
 
-/// Whether every stage of a scheme changes v by the mean of two accelerations, and u by that of two velocities but for
-/// a multiple of the change of a, the same in all stages; the balance holds at these states. The energy that such a
-/// scheme conserves changes by the work of the mean force of contact over each stage (theory, section 15.1).
+/// Whether every stage of a scheme changes v by the mean of two accelerations, and u by the mean of two velocities up
+/// to a multiple of the change of a, the same in all stages, with the balance at these states. The energy that such a
+/// scheme conserves changes by the work of the mean contact force over each stage (theory, section 15.1).
 pub(crate) fn steps_by_means(tableau: &Tableau) -> bool {
     // Each value is a combination of u, h v and h² a at the start of the step, and of the unknowns of its stages.
     type Values = Vec<f64>;

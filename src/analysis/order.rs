@@ -3,7 +3,7 @@
 use super::series::{Series, solve};
 use crate::tableau::{Row, Tableau};
 
-/// Order of a scheme in displacement, velocity and acceleration, and where its stored values live.
+/// Order of a scheme in displacement, velocity and acceleration, and the times of its stored values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Order {
@@ -14,7 +14,7 @@ pub struct Order {
     /// Order of the accelerations, at the time of the state.
     pub acceleration: u32,
     /// Time at which the stored velocity is of higher order, in steps from the time of the state: −½ for a half-step
-    /// velocity, 0 for most schemes. A [`State`](crate::State) shows it extrapolated to its own time.
+    /// velocity, 0 for most schemes. A [`State`](crate::State) extrapolates it to its own time.
     pub velocity_shift: f64,
     /// The same for the stored acceleration: α_m − α_f for generalized-α.
     pub acceleration_shift: f64,
@@ -29,14 +29,14 @@ impl Order {
 /// Higher orders are reported as this one.
 const HIGHEST: i32 = 6;
 
-/// Damping and stiffness of the test equation: unrelated numbers, so that no term cancels by chance.
+/// Damping and stiffness of the test equation: unrelated numbers, so that no terms cancel accidentally.
 const TEST: [f64; 2] = [0.731, 1.273];
 
 /// Order of consistency of a tableau.
 ///
-/// The rows are applied to the equation u″ + c u′ + k u = F with the motion eᵗ. Its response in the scheme, a power
-/// series in h, is found exactly; the first power in which it differs from eᵗ is the order. Nothing is simulated, and
-/// no step size is chosen.
+/// The rows are applied to the equation u″ + c u′ + k u = F with the motion eᵗ. Its response in the scheme is
+/// computed exactly as a power series in h; the first power in which it differs from eᵗ is the order. No run is
+/// simulated, and no step size is chosen.
 ///
 /// ```
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};

@@ -17,8 +17,8 @@ pub struct Overshoot {
 /// Number of steps in which overshoot is measured.
 const STEPS: usize = 10;
 
-/// Overshoot of an undamped oscillator that is released from u₀ at rest, with Ω = ω h (Hilber, Hughes, Earthq. Eng.
-/// Struct. Dyn. 6, 1978). An exact scheme has 1 and 1.
+/// Overshoot of an undamped oscillator released from u₀ at rest, with Ω = ω h (Hilber, Hughes, Earthq. Eng. Struct.
+/// Dyn. 6, 1978). An exact scheme has 1 and 1.
 ///
 /// ```
 /// use contact_dynamics::tableau::StartUp;
@@ -36,7 +36,7 @@ pub fn overshoot(tableau: &Tableau, omega: f64, start: StartUp) -> Overshoot {
     Overshoot { displacement: largest(0), velocity: largest(1) / omega }
 }
 
-/// Exponents with which displacement and velocity overshoot grow for Ω → ∞ (0: bounded).
+/// Exponents of the growth of displacement and velocity overshoot for Ω → ∞ (0: bounded).
 ///
 /// ```
 /// use contact_dynamics::tableau::StartUp;

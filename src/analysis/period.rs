@@ -7,9 +7,9 @@ use crate::tableau::Tableau;
 /// p of the relative elongation of periods T′/T = 1 + p Ω² + O(Ω⁴), without damping: 1/12 for the trapezoidal rule,
 /// −1/24 for central differences.
 ///
-/// `None` if free oscillations err at first order, in phase or amplitude.
+/// `None` if free oscillations have a first-order error in phase or amplitude.
 ///
-/// Exact but for rounding: the motion eᵗ is put into the rows for u″ = u, and the remainder shows which equation it
+/// Exact to rounding: the motion eᵗ is inserted into the rows for u″ = u, and the remainder gives the equation that it
 /// solves instead; no oscillation is sampled at small Ω.
 ///
 /// ```
@@ -22,7 +22,7 @@ use crate::tableau::Tableau;
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub fn period_elongation(tableau: &Tableau) -> Option<f64> {
-    // The response η of u″ + k u to the force eᵗ at k = −1, where the exact one is unbounded: 1/η is the missing part
+    // The response η of u″ + k u to the force eᵗ at k = −1, where the exact response is unbounded: 1/η is the missing part
     // of k, e h² + …, so eᵗ is the scheme's motion for u″ = (1 + e h²) u.
     let [displacement, ..] = response(tableau, [0.0, -1.0], 1.0)?;
     let missing = Series::monomial(1.0, 0).over(&displacement);

@@ -8,15 +8,15 @@ use crate::error::Result;
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 use std::fmt;
 
-/// The properties of a scheme; made by [`report`], printed by its `Display`.
+/// The properties of a scheme; computed by [`report`], printed by its `Display`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// Orders, and where stored values live.
+    /// Orders, and times of stored values.
     pub order: Order,
-    /// Solves (explicit: force evaluations) a step.
+    /// Number of solves (explicit: force evaluations) per step.
     pub stages: usize,
-    /// Vectors that a step reads from the ones before.
+    /// Number of vectors that a step reads from earlier ones.
     pub stored: usize,
     /// Spectral radius at infinite frequency; `None` for explicit schemes.
     pub radius_at_infinity: Option<f64>,
@@ -28,15 +28,15 @@ pub struct Report {
     pub zero_stability: ZeroStability,
     /// Whether every mode in the range of stability keeps its amplitude without damping.
     pub keeps_amplitudes: bool,
-    /// Exponents with which displacement and velocity of the first steps grow with Ω; `None` for explicit schemes.
+    /// Exponents of the growth with Ω of displacement and velocity in the first steps; `None` for explicit schemes.
     pub overshoot_growth: Option<[f64; 2]>,
-    /// The momentum that is conserved, as coefficients of (u/h, v, h a) of the states, newest first.
+    /// The conserved momentum, as coefficients of (u/h, v, h a) of the states, newest first.
     pub momentum: Vec<[f64; 3]>,
-    /// Where contact is imposed; `None` if no multiplier can impose it.
+    /// The condition imposed by contact; `None` if no multiplier can impose it.
     pub contact: Option<ContactLevel>,
 }
 
-/// All properties of a tableau, a user's own as well.
+/// All properties of a tableau, including user-defined ones.
 ///
 /// # Errors
 ///
@@ -79,7 +79,7 @@ pub fn report(tableau: &Tableau) -> Result<Report> {
 }
 
 impl Report {
-    /// The conserved momentum in words, such as `v + 0.5 h a`.
+    /// The conserved momentum as a text, such as `v + 0.5 h a`.
     pub fn momentum_in_words(&self) -> String {
         let terms = self.momentum.iter().enumerate().flat_map(|(k, coefficients)| {
             let age = "₋".repeat(k);
@@ -94,7 +94,7 @@ impl Report {
                 (false, false) => " + ",
                 (false, true) => " − ",
             };
-            // Four digits at most, none for 1.
+            // At most four digits, none for 1.
             let factor = (c.abs() * 1e4).round() / 1e4;
             if (factor - 1.0).abs() > 1e-12 {
                 words += &factor.to_string();
@@ -105,7 +105,7 @@ impl Report {
         words
     }
 
-    /// Where contact is imposed, in words.
+    /// The condition imposed by contact, as a text.
     pub fn contact_in_words(&self) -> &'static str {
         match self.contact {
             None => "compliant laws only",
@@ -132,7 +132,7 @@ impl fmt::Display for Report {
         line("ρ∞", self.radius_at_infinity.map_or("explicit".into(), |radius| format!("{radius:.4}")))?;
         line("stable for Ω", self.critical_omega.map_or("unconditional".into(), |omega| format!("< {omega:.4}")))?;
         let figures = self.period_and_damping;
-        // Rounded first: no minus before a zero.
+        // Rounded first, so that a zero has no minus sign.
         let percent = |value: f64| format!("{:.3} %", (1e5 * value).round() / 1e3 + 0.0);
         line("period error, h/T = 0.1", figures.map_or("no oscillation".into(), |(period, _)| percent(period)))?;
         line("damping, h/T = 0.1", figures.map_or("no oscillation".into(), |(_, damping)| percent(damping)))?;

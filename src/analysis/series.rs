@@ -1,5 +1,4 @@
-//! Truncated Laurent series in the step size, with running error bounds, by which terms that cancel are recognized as
-//! zero.
+//! Truncated Laurent series in the step size, with running error bounds that identify cancelling terms as zero.
 
 /// `h^valuation (c₀ + c₁ h + c₂ h² + …)`; terms beyond the stored ones are unknown, an empty series is zero.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,9 +8,9 @@ pub(super) struct Series {
     terms: Vec<(f64, f64)>,
 }
 
-/// Terms kept of a function.
+/// Number of terms kept.
 const TERMS: usize = 12;
-/// Rounding errors are taken for zero up to this multiple of their bound.
+/// Coefficients up to this multiple of their rounding bound count as zero.
 const CAUTION: f64 = 16.0;
 
 impl Series {
@@ -46,12 +45,12 @@ impl Series {
         (!self.is_zero()).then_some(self.valuation)
     }
 
-    /// Coefficient of `h^power`, zero beyond what is known.
+    /// Coefficient of `h^power`, zero beyond the known terms.
     pub(super) fn coefficient(&self, power: i32) -> f64 {
         usize::try_from(power - self.valuation).ok().and_then(|i| self.terms.get(i)).map_or(0.0, |term| term.0)
     }
 
-    /// Size of the first coefficient.
+    /// Magnitude of the first coefficient.
     pub(super) fn leading(&self) -> f64 {
         self.terms.first().map_or(0.0, |term| term.0.abs())
     }
@@ -136,11 +135,11 @@ impl Series {
     }
 }
 
-/// Solves `matrix x = right` over the field of Laurent series; `None` if the matrix is singular to the terms known.
+/// Solves `matrix x = right` over the field of Laurent series; `None` if the matrix is singular to the known terms.
 pub(super) fn solve(mut matrix: Vec<Vec<Series>>, mut right: Vec<Series>) -> Option<Vec<Series>> {
     let n = right.len();
     for k in 0..n {
-        // The lowest power first: it divides the others without a loss of terms.
+        // The lowest power first: dividing by it loses no terms.
         let candidates = (k..n).filter_map(|i| matrix[i][k].valuation().map(|power| (power, i)));
         let order = |x: &(i32, usize), y: &(i32, usize)| {
             x.0.cmp(&y.0).then_with(|| matrix[y.1][k].leading().total_cmp(&matrix[x.1][k].leading()))

@@ -6,8 +6,8 @@ use faer::{Mat, c64};
 
 /// Spectral radius at infinite frequency (ρ∞), without damping; `None` for explicit schemes.
 ///
-/// It is taken from the limit of the amplification matrix itself, in which stiffness alone decides the unknown; no
-/// large number is involved.
+/// Computed from the limit of the amplification matrix, in which stiffness alone determines the unknown; no large
+/// numbers are involved.
 ///
 /// ```
 /// use contact_dynamics::{Composite, Newmark, TimeIntegrator, analysis};
@@ -26,7 +26,8 @@ pub fn radius_at_infinity(tableau: &Tableau) -> Option<f64> {
     let mut roots = limit.eigenvalues().ok()?;
     let largest = roots.iter().copied().max_by(|x, y| modulus(*x).total_cmp(&modulus(*y)))?;
     roots.sort_by(|x, y| modulus(*x - largest).total_cmp(&modulus(*y - largest)));
-    // A root of multiplicity m splits by the m-th root of the rounding error, while the mean of its parts stays.
+    // A root of multiplicity m splits by the m-th root of the rounding error, while the mean of the split roots is
+    // unchanged.
     let mean = |m: usize| {
         let sum = roots[..m].iter().fold(c64::new(0.0, 0.0), |sum, root| sum + *root);
         c64::new(sum.re / m as f64, sum.im / m as f64)
@@ -43,7 +44,7 @@ fn modulus(x: c64) -> f64 {
     x.re.hypot(x.im)
 }
 
-/// Whether powers of a matrix vanish to rounding: all eigenvalues are zero then.
+/// Whether powers of a matrix vanish to rounding, so that all eigenvalues are zero.
 fn is_nilpotent(a: &Mat<f64>) -> bool {
     let n = a.nrows();
     let power = (1..n).fold(a.clone(), |power, _| &power * a);
@@ -51,8 +52,8 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
     power.norm_max() <= 1e-13 * scale.powi(i32::try_from(n).unwrap_or(i32::MAX))
 }
 
-/// Ω up to which the scheme is stable at damping ratio ξ: the spectral radius does not exceed 1 below it. `None` if
-/// that holds for all Ω between 0.01 and 10⁴, `Some(0.0)` if it fails at 0.01 already.
+/// Ω up to which the scheme is stable at damping ratio ξ: below it the spectral radius is at most 1. `None` if this
+/// holds for all Ω between 0.01 and 10⁴, `Some(0.0)` if it already fails at 0.01.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, Composite, TimeIntegrator, analysis};
@@ -64,16 +65,17 @@ pub fn critical_omega(tableau: &Tableau, xi: f64) -> Option<f64> {
     critical_along(tableau, 1.0, 2.0 * xi)
 }
 
-/// The longest stable step of the mode a + c v + ω² u = 0, which may have no stiffness; `None` if all are, as far as
-/// [`critical_omega`] looks.
+/// The longest stable step of the mode a + c v + ω² u = 0, which may have no stiffness; `None` if all steps in the
+/// range of [`critical_omega`] are stable.
 pub(crate) fn critical_step(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
     let rate = omega.max(damping);
     (rate > 0.0).then(|| critical_along(tableau, omega / rate, damping / rate)).flatten().map(|x| x / rate)
 }
 
-/// x up to which a step with Ω = x `omega` and Δ = x `damping` is stable, one of which is 1 at least.
+/// x up to which a step with Ω = x `omega` and Δ = x `damping` is stable; at least one of both is 1.
 fn critical_along(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
-    // Roots that are nearly double at 1 are known to eps/x, matrices of size x to eps x. NaN counts as unstable.
+    // Roots that are nearly double at 1 have an accuracy of eps/x, matrices of size x one of eps x. NaN counts as
+    // unstable.
     let radius = |x: f64| largest_modulus(&roots(tableau, x * omega, x * damping));
     let is_stable = |x: f64| radius(x) <= 1.0 + 1e-11 + 1e-13 * x;
     let at = |i: i32| 10_f64.powf(f64::from(i) / 80.0);

@@ -11,8 +11,8 @@ use crate::tableau::{MAX_PAST, Row, Rows, Stage, Tableau, U, V, Z};
 /// ```
 ///
 /// * Order 2; reads u and v of two states.
-/// * Unconditionally stable; ρ∞ = 0. Period elongation Ω²/3 and damping ¼ Ω³: the composite scheme, which costs the
-///   same, is more accurate in both.
+/// * Unconditionally stable; ρ∞ = 0. Period elongation Ω²/3 and damping ¼ Ω³: the composite scheme, at the same cost,
+///   is more accurate in both.
 /// * Conserves linear momentum in the form (3 v − v₋)/2.
 /// * Contact is imposed on the displacements at the end of the step; the past needs the history projection at impact.
 ///

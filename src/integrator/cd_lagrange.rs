@@ -11,15 +11,16 @@ use crate::tableau::{ContactLevel, Rows, Stage, Tableau};
 /// 0 ≤ ġ at v' + ½ h a' ⊥ λ' ≥ 0  for contacts with g' ≤ 0
 /// ```
 ///
-/// The rows are those of [`CentralDifference`](crate::CentralDifference); with a lumped mass nothing is factorized.
+/// The rows are the same as in [`CentralDifference`](crate::CentralDifference); with a lumped mass no matrix is
+/// factorized.
 ///
 /// * Order 2 on smooth motion; period shortening Ω²/24, no damping; stable for Ω < 2.
 /// * Conserves linear momentum in the form v + ½ h a. Impacts are plastic (restitution 0).
 /// * Contact is imposed on v' + ½ h a' once the gap has closed. A node that would meet an obstacle a fraction φ of a
-///   step after its beginning, at the relative speed v, keeps a penetration of (1 − φ) h v as long as they touch. It is
-///   of first order in h, and that of a single step: impacts do not add up (theory, 5.1; `docs/reliability.md` has long
-///   runs). [`CentralDifference`](crate::CentralDifference), with the same rows, has none. At impact the force is the
-///   impulse over h, and no correction applies.
+///   step after its beginning, at the relative speed v, keeps a penetration of (1 − φ) h v as long as they touch. It
+///   is of first order in h and the error of a single step: impacts do not accumulate it (theory, 5.1;
+///   `docs/reliability.md` has long runs). [`CentralDifference`](crate::CentralDifference), with the same rows, has
+///   no penetration. At impact the force is the impulse over h, and no correction applies.
 ///
 /// ```
 /// use contact_dynamics::{CdLagrange, TimeIntegrator, analysis};

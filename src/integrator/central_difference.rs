@@ -18,11 +18,12 @@ use crate::tableau::{A, ContactLevel, Rows, Stage, Tableau, U, V, Z};
 ///   smallest element.
 /// * Exact in one dimension at Courant number 1 with lumped linear elements of equal size, also through impact and
 ///   release.
-/// * Conserves linear momentum in the form v + ½ h a, and an energy that differs from that of the system by up to Ω²/4
-///   of it.
-/// * Contact is imposed on the displacements of the next step, which λ' decides: gaps are exact, u of a state never
-///   penetrates. The velocity of a state is the mean of those before and after it, and no correction applies. (A
-///   multiplier is found for one step size: if the step changes right after an impact, a small gap is left.)
+/// * Conserves linear momentum in the form v + ½ h a, and an energy that differs from the system's energy by up to a
+///   fraction Ω²/4.
+/// * Contact is imposed on the displacements of the next step, which λ' determines: gaps are exact, and u of a state
+///   never penetrates. The velocity of a state is the mean of the velocities before and after it, and no correction
+///   applies. The multiplier is valid for one step size: if the step changes right after an impact, a small gap
+///   remains.
 ///
 /// ```
 /// use contact_dynamics::{CentralDifference, TimeIntegrator, analysis};

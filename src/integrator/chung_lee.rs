@@ -11,7 +11,8 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// u' = u + h v + h² [ (½ − β) a + β a' ],     v' = v − ½ h a + 3/2 h a'
 /// ```
 ///
-/// Forces are those at the start of the step; with a lumped mass no matrix is factorized, damping or not.
+/// Forces are evaluated at the start of the step; with a lumped mass no matrix is factorized, with or without
+/// damping.
 ///
 /// * Order 2. The stored a lags by one step; the acceleration of a [`State`](crate::State) is extrapolated to its time.
 /// * β = 1 has no damping, β = 28/27 the most (ρ_b = ½; the spectrum of Hulbert–Chung with ρ_b = ½). Stable for

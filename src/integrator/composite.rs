@@ -10,7 +10,7 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// a' = (u' − 2u + u₋)/h² + (v' − 2v + v₋)/h        M a' + C v' + f_int(u') = f(t') + Gᵀλ
 /// ```
 ///
-/// Effective matrix `K + 3/(2h) C + 5/(2h²) M`: one symmetric solve a step.
+/// Effective matrix `K + 3/(2h) C + 5/(2h²) M`: one symmetric solve per step.
 ///
 /// * Order 2 in u, v and a; reads u and v of two states, never a.
 /// * Unconditionally stable for every damping ratio; ρ∞ = 0, reached over about four steps.

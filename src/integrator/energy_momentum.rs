@@ -11,20 +11,20 @@ use crate::tableau::{Rows, Stage, Tableau, U, V, Z};
 /// u' = u + ½ h (v + v'),     M (v' − v)/h = f(t + ½ h; u → u', v̄) + Gᵀ λ,     v̄ = ½ (v + v')
 /// ```
 ///
-/// The force of the path u → u' is the system's own ([`path_force`](crate::System::path_force)), or, if it has none,
-/// the mean of the forces at its start, middle and end that is nearest to Simpson's rule and does that work; this mean
-/// reads [`potential_energy`](crate::System::potential_energy) and [`external_load`](crate::System::external_load), and
-/// takes three forces and two tangents an iteration.
+/// The system's own force along the path u → u' ([`path_force`](crate::System::path_force)) is used. If there is
+/// none, it is the mean of the forces at start, middle and end that is nearest to Simpson's rule and does that work;
+/// this mean reads [`potential_energy`](crate::System::potential_energy) and
+/// [`external_load`](crate::System::external_load), and needs three forces and two tangents per iteration.
 ///
-/// * Conserves the energy of conservative systems without contact, whatever the step, to the tolerance of
-///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` conserves it
-///   (the mean stress on the mean configuration does, Simpson's mean errs by O(h²)).
-/// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a lives at the
-///   middle of the step and is extrapolated for a [`State`](crate::State).
-/// * The exact tangent of a path is not symmetric and takes [`Lu`](crate::Lu); a symmetric one close to it takes an
-///   iteration more. For the mean of three forces the tangent is that of Simpson's rule.
-/// * Contact is imposed on the displacements at the end of the step. Impacts cost the energy of the contact nodes if
-///   they are corrected; without a correction energy may rise or fall there.
+/// * Conserves the energy of conservative systems without contact, for any step, to the tolerance of
+///   [`Newton`](crate::Newton)'s method; linear momentum in the form v; angular momentum if `force_along` conserves
+///   it (the mean stress on the mean configuration does, Simpson's mean has an error of O(h²)).
+/// * Order 2. On linear systems it is the trapezoidal rule, unconditionally stable, ρ∞ = 1; the stored a belongs to
+///   the middle of the step and is extrapolated for a [`State`](crate::State).
+/// * The exact tangent of a path is unsymmetric and needs [`Lu`](crate::Lu); a symmetric approximation takes one more
+///   iteration. For the mean of three forces the tangent of Simpson's rule is used.
+/// * Contact is imposed on the displacements at the end of the step. Corrected impacts lose the energy of the contact
+///   nodes; without a correction the energy may rise or fall there.
 ///
 /// ```
 /// use contact_dynamics::{EnergyMomentum, Newmark, TimeIntegrator, analysis};

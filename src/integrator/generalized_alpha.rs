@@ -5,7 +5,7 @@ use super::{TimeIntegrator, within};
 use crate::error::Result;
 use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 
-/// Generalized-α: Newmark's rows with the balance taken inside the step.
+/// Generalized-α: Newmark's rows with the balance inside the step.
 ///
 /// ```text
 /// u' = u + h v + h² [ (½ − β) a + β a' ],     v' = v + h [ (1 − γ) a + γ a' ]
@@ -22,16 +22,16 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// [`hht`]: Self::hht
 /// [`wbz`]: Self::wbz
 ///
-/// All three take γ = ½ − α_m + α_f and β = ¼ (1 − α_m + α_f)².
+/// All three have γ = ½ − α_m + α_f and β = ¼ (1 − α_m + α_f)².
 ///
-/// * Order 2 if γ = ½ − α_m + α_f. The stored a lives at t + (α_m − α_f) h and is only of order 1 at the time of the
-///   state; the acceleration of a [`State`](crate::State) is extrapolated to its time and of order 2.
+/// * Order 2 if γ = ½ − α_m + α_f. The stored a belongs to t + (α_m − α_f) h and is only of order 1 at the time of
+///   the state; the acceleration of a [`State`](crate::State) is extrapolated to its time and of order 2.
 /// * Unconditionally stable for α_m ≤ α_f ≤ ½ and β ≥ ¼ + ½ (α_f − α_m). Chung–Hulbert has the least low-frequency
 ///   damping for a given ρ∞; its spectrum with ρ∞ = 0 is Houbolt's.
-/// * Internal forces are those of the mean displacement, f_int(ū), not the mean of two forces.
+/// * The internal force is evaluated at the mean displacement, f_int(ū), not as the mean of two forces.
 /// * Conserves linear momentum in the form v + (1 − γ − α_m) h a.
-/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + (1 − α_f) h. The rows
-///   read a of the past: after an impact they need both parts of the correction.
+/// * Contact is imposed on the displacements at the end of the step; the multiplier belongs to t + (1 − α_f) h. The
+///   rows read a of the past: after an impact they need both parts of the correction.
 ///
 /// ```
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};
@@ -60,7 +60,7 @@ impl GeneralizedAlpha {
         within("ρ∞ of Chung and Hulbert's scheme", rho, 0.0..=1.0, "in [0, 1]").map(Self::of_radius)
     }
 
-    /// The scheme of Chung and Hulbert for a radius that is known to be in range.
+    /// The scheme of Chung and Hulbert for a checked radius.
     pub(crate) fn of_radius(rho: f64) -> Self {
         Self::optimal("Chung–Hulbert", rho, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
     }

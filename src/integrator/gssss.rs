@@ -5,7 +5,8 @@ use crate::error::Result;
 use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 
 /// The generalized single-step single-solve family U0(ρ₁, ρ₂, ρ₃) of Zhou and Tamma (Int. J. Numer. Meth. Eng. 59,
-/// 2004): second-order schemes without displacement overshoot, by the moduli of their roots at infinite frequency.
+/// 2004): second-order schemes without displacement overshoot, parametrized by the moduli of their roots at infinite
+/// frequency.
 ///
 /// With δa = a' − a and
 /// λ₃ = 1/((1+ρ₁)(1+ρ₂)), λ₅ = ½ (3 + ρ₁ + ρ₂ − ρ₁ρ₂) λ₃, w = 1/(1+ρ₃), w₆ = (2 + ρ₁ + ρ₂ + ρ₃ − ρ₁ρ₂ρ₃) λ₃ w:
@@ -15,12 +16,12 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// M (a + w₆ δa) + C (v + w (v' − v)) + f_int(u + w (u' − u)) = f(t + w h) + Gᵀλ
 /// ```
 ///
-/// * Order 2; the stored a lives at t + (w − w₆) h, that of a [`State`](crate::State) is extrapolated to its time.
+/// * Order 2; the stored a belongs to t + (w − w₆) h; the a of a [`State`](crate::State) is extrapolated to its time.
 /// * Unconditionally stable for ρ₃ ≤ ρ₁ ≤ ρ₂ ≤ 1; ρ∞ = ρ₂. U0(1, 1, 0) has the trapezoidal rule's spectrum, U0(ρ, ρ, ρ)
 ///   is Chung–Hulbert's scheme.
 /// * Conserves linear momentum; U0(1, 1, ρ₃) keeps the energy of a linear oscillator bounded without damping it.
-/// * Contact is imposed on the displacements at the end of the step; the multiplier lives at t + w h. The rows read a
-///   of the past.
+/// * Contact is imposed on the displacements at the end of the step; the multiplier belongs to t + w h. The rows read
+///   a of the past.
 ///
 /// ```
 /// use contact_dynamics::{Gssss, TimeIntegrator, analysis};

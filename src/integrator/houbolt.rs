@@ -10,7 +10,7 @@ use crate::tableau::{Rows, Stage, Tableau, U, Z};
 /// a' = (2 u' − 5 u + 4 u₋ − u₋₋)/h²               M a' + C v' + f_int(u') = f(t') + Gᵀλ
 /// ```
 ///
-/// * Order 2; reads three displacements and nothing else.
+/// * Order 2; reads only three displacements.
 /// * Unconditionally stable; ρ∞ = 0 with strong damping also of the low modes (period elongation 11/24 Ω², damping
 ///   proportional to Ω³: the spectrum of Chung–Hulbert with ρ∞ = 0).
 /// * Conserves linear momentum in the form (2 u − 3 u₋ + u₋₋)/h.

@@ -12,13 +12,14 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// α_m = (2ρ − 1)/(1 + ρ),  β = (5 − 3ρ)/((1 + ρ)²(2 − ρ)),  γ = 3/2 − α_m,  ρ the modulus ρ_b where the roots meet
 /// ```
 ///
-/// Forces are those at the start of the step; with a lumped mass no matrix is factorized, damping or not.
+/// Forces are evaluated at the start of the step; with a lumped mass no matrix is factorized, with or without
+/// damping.
 ///
-/// * Order 2. The stored a lives at t + (α_m − 1) h; the acceleration of a [`State`](crate::State) is extrapolated to
-///   its time.
-/// * Stable for Ω² < 2 (1 − 2α_m)/(2β − γ): Ω below 1.5492, 1.8665, 1.9758, 2 at ρ_b = 0, ½, 0.8, 1; the roots meet at
-///   Ω_b = (1 + ρ_b) √(2 − ρ_b). Damping forces lag: with any damping the member ρ_b = 1 is unstable for every h, and
-///   building a simulation with both is refused.
+/// * Order 2. The stored a belongs to t + (α_m − 1) h; the acceleration of a [`State`](crate::State) is extrapolated
+///   to its time.
+/// * Stable for Ω² < 2 (1 − 2α_m)/(2β − γ): Ω below 1.5492, 1.8665, 1.9758, 2 at ρ_b = 0, ½, 0.8, 1; the roots meet
+///   at Ω_b = (1 + ρ_b) √(2 − ρ_b). Damping forces lag: with any damping the member ρ_b = 1 is unstable for every h,
+///   and building a simulation with both fails.
 /// * Conserves linear momentum in the form v + (1 − γ − α_m) h a.
 /// * Contact is imposed on the displacements at the end of the step by the multiplier at its start.
 ///

@@ -12,16 +12,17 @@ use crate::tableau::{ContactLevel, Rows, Stage, Tableau, U, V, Z};
 /// 0 ≤ ġ' ⊥ λ ≥ 0  for contacts with g(t) + ½ h ġ(t) ≤ 0
 /// ```
 ///
-/// * Order 2 for θ = ½, order 1 otherwise. The stored a is the mean of the step and lives at its middle; the
+/// * Order 2 for θ = ½, order 1 otherwise. The stored a is the mean over the step and belongs to its middle; the
 ///   acceleration of a [`State`](crate::State) is extrapolated to its time.
 /// * Unconditionally stable for θ ≥ ½; ρ∞ = (1 − θ)/θ. θ = ½ conserves the energy of linear free motion and has the
-///   trapezoidal rule's spectrum.
+///   spectrum of the trapezoidal rule.
 /// * Conserves linear momentum in the form v. Impacts are plastic (restitution 0).
 /// * Contact is imposed on the velocities at the end of the step, and gaps are not controlled. A node that would meet
-///   an obstacle a fraction φ of a step after its beginning, at the relative speed v, keeps a penetration of
-///   (1 − θ − φ) h v for φ ≤ ½ and of (2 − θ − φ) h v beyond as long as they touch (negative: a gap); with θ = ½ that
-///   is ((½ − φ) mod 1) h v. It is of first order in h, and that of a single step: impacts do not add up (theory, 5.1;
-///   `docs/reliability.md` has long runs). At the impact the force is the impulse over h, and no correction applies.
+///   an obstacle a fraction φ of a step after its beginning, at the relative speed v, keeps a penetration of (1 − θ −
+///   φ) h v for φ ≤ ½ and of (2 − θ − φ) h v beyond as long as they touch (negative: a gap); with θ = ½ it is ((½ −
+///   φ) mod 1) h v. It is of first order in h and the error of a single step: impacts do not accumulate it (theory,
+///   5.1; `docs/reliability.md` has long runs). At the impact the force is the impulse over h, and no correction
+///   applies.
 ///
 /// ```
 /// use contact_dynamics::{MoreauJean, TimeIntegrator, analysis};

@@ -13,15 +13,15 @@ use crate::tableau::{A, ContactLevel, Row, Rows, Stage, Tableau, U, V, Z};
 /// M a + C v̂ + f_int(u) = f + Gᵀλ  at the end of either stage;   0 ≤ g ⊥ λ ≥ 0  at the end of the next one
 /// ```
 ///
-/// Two force evaluations a step; with a lumped mass no matrix is factorized, damping or not.
+/// Two force evaluations per step; with a lumped mass no matrix is factorized, with or without damping.
 ///
 /// * Order 2. For p = 0.54: period error −0.25 % at h/T = 0.1, stable for Ω < 3.745; high frequencies are damped.
 /// * Conserves linear momentum.
-/// * Displacements are known before a stage's forces, so contact is imposed on those at the end of the next stage,
-///   which the multiplier decides (forward increments, as in [`CentralDifference`](crate::CentralDifference)): no state
-///   penetrates, and no correction applies. With contact imposed on the velocities of either stage instead, the
-///   multipliers of the two stages counteract each other: the force of two bars had ten times the error. A rigid mass
-///   leaves with up to 6 % of its approach speed.
+/// * Displacements are known before the forces of a stage, so contact is imposed on those at the end of the next
+///   stage, which the multiplier determines (forward increments, as in
+///   [`CentralDifference`](crate::CentralDifference)): no state penetrates, and no correction applies. If contact
+///   were imposed on the velocities of either stage, the multipliers of the two stages would counteract each other:
+///   the force of two bars had ten times the error. A rigid mass leaves with up to 6 % of its approach speed.
 ///
 /// ```
 /// use contact_dynamics::{NohBathe, TimeIntegrator, analysis};
@@ -74,7 +74,7 @@ impl TimeIntegrator for NohBathe {
             let contact = ContactLevel::Position { lead };
             Stage::new(Rows { u, v, a: Z }).ending_at(end).balanced(balance, end).with_contact(contact)
         };
-        // Either stage looks ahead to the end of the next one.
+        // Either stage imposes contact at the end of the next one.
         let first = stage(p, p, s, V[0] + (0.5 * p) * (A[0] + Z));
         let second = stage(s, 1.0, p, V[0] + s * (q0 * A[1] + (0.5 + q1) * A[0] + q2 * Z));
         Tableau::staged(vec![first, second])

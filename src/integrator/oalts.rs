@@ -12,7 +12,7 @@ use crate::tableau::{A, MAX_PAST, Row, Rows, Stage, Tableau, U, V, Z};
 /// ```
 ///
 /// * Order 2; reads u, v and a of two states.
-/// * Unconditionally stable with ρ∞ = ρ. For ρ = 1 the second state carries a root −1 that nothing damps: prefer
+/// * Unconditionally stable with ρ∞ = ρ. For ρ = 1 the second state has an undamped root −1: prefer
 ///   [`Newmark::trapezoidal`](crate::Newmark::trapezoidal), its one-step form.
 /// * Conserves linear momentum.
 /// * Contact is imposed on the displacements at the end of the step; the past needs the history projection at impact.

@@ -12,7 +12,7 @@ use crate::tableau::{MAX_PAST, Row, Rows, Stage, Tableau, U, V, Z};
 ///
 /// * Order 2; reads u and v of three states.
 /// * Unconditionally stable; ρ∞ = 0. Period elongation Ω²/6 and damping proportional to Ω⁵: of the multistep schemes
-///   with one solve a step it changes low modes least.
+///   with one solve per step it changes low modes least.
 /// * Conserves linear momentum in the form (10 v − 5 v₋ + v₋₋)/6.
 /// * Contact is imposed on the displacements at the end of the step; the past needs the history projection at impact.
 ///

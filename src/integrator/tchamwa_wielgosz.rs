@@ -15,7 +15,7 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// * Order 1. Stable for Ω < 2/√(2φ − 1); the roots meet at Ω_b = 2/φ with modulus ρ_b = (2 − φ)/φ.
 /// * Conserves linear momentum in the form v + h a.
 /// * The unknown enters neither u' nor v': a multiplier of the step could not close a gap or stop an approach, so
-///   multiplier contact is refused when a simulation is built.
+///   building a simulation with multiplier contact fails.
 ///
 /// ```
 /// use contact_dynamics::{TchamwaWielgosz, TimeIntegrator, analysis};

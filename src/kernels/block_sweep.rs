@@ -1,5 +1,5 @@
-//! Sweeps over a supernodal factor for several right-hand sides at once, by products of dense blocks; a single one is
-//! passed on to `sweep`.
+//! Sweeps over a supernodal factor for several right-hand sides together, by products of dense blocks; a single one
+//! is passed to `sweep`.
 
 use super::cholesky::{Columns, Supernodal, supernodes};
 use super::sweep;
@@ -39,7 +39,7 @@ pub(crate) fn forward<T: Scalar>(
     }
 }
 
-/// The backward sweep over `columns`; entries behind them hold the solution.
+/// The backward sweep over `columns`; later entries hold the solution.
 #[inline]
 pub(crate) fn backward<T: Scalar>(
     factor: &Supernodal<'_, T>,
@@ -75,7 +75,7 @@ struct Panel<'a, T> {
     /// The lower triangle on these columns, and the rows below it.
     top: MatRef<'a, T>,
     below: MatRef<'a, T>,
-    /// How many of the rows below follow the columns directly; the others are `pattern`.
+    /// Number of the rows below that directly follow the columns; the others are `pattern`.
     following: usize,
     pattern: &'a [usize],
 }

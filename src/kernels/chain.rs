@@ -1,14 +1,14 @@
-//! Recurrences of L D Lᵀ with bidiagonal L, down and up two chains at a time.
+//! Recurrences of L D Lᵀ with bidiagonal L, forward and backward along two chains at a time.
 //!
-//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains at a time share the
-//! wait, and fused multiply-add, where the machine has it, halves it.
+//! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains processed together
+//! share the wait, and fused multiply-add, if the machine has it, halves it.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
 
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-/// Two chains: the entries of L below the diagonal (one for each unknown; the last one couples it to the unknown behind
-/// the chain), 1/D, and the unknowns. All slices of a chain have the same length.
+/// Two chains: the entries of L below the diagonal (one for each unknown; the last one couples it to the unknown
+/// after the chain), 1/D, and the unknowns. All slices of a chain have the same length.
 #[derive(Debug)]
 pub struct Chains<'a, T> {
     pub lower: [&'a [T]; 2],
@@ -16,7 +16,7 @@ pub struct Chains<'a, T> {
     pub x: [&'a mut [T]; 2],
 }
 
-/// `x_k −= l_{k−1} x_{k−1}` down both chains.
+/// `x_k −= l_{k−1} x_{k−1}` forward along both chains.
 pub(crate) fn forward<T: Scalar>(chains: Chains<'_, T>) {
     match fuses() {
         true => Arch::new().dispatch(Down(chains)),
@@ -24,7 +24,7 @@ pub(crate) fn forward<T: Scalar>(chains: Chains<'_, T>) {
     }
 }
 
-/// `x_k = x_k / d_k − l_k x_{k+1}` up both chains, from the unknowns `behind` them.
+/// `x_k = x_k / d_k − l_k x_{k+1}` backward along both chains, from the unknowns `behind` them.
 pub(crate) fn backward<T: Scalar>(chains: Chains<'_, T>, behind: [T; 2]) {
     match fuses() {
         true => Arch::new().dispatch(Up(chains, behind)),
@@ -89,7 +89,7 @@ fn up<T: Scalar>(
     behind: [T; 2],
     eliminate: impl Fn(T, T, T) -> T,
 ) {
-    // The longer chain begins with the unknowns that the other lacks.
+    // The longer chain starts with the unknowns that the other lacks.
     let common = x0.len().min(x1.len());
     let (front0, front1) = (x0.len() - common, x1.len() - common);
     let ((rest_x0, x0), (rest_x1, x1)) = (x0.split_at_mut(front0), x1.split_at_mut(front1));

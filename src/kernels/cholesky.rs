@@ -27,7 +27,7 @@ pub struct Simplicial<'a, T> {
     pub pointers: &'a [usize],
     pub rows: &'a [usize],
     pub values: &'a [T],
-    /// Entries left out at the front of the vectors swept.
+    /// Number of entries omitted at the front of the swept vectors.
     pub skipped: usize,
 }
 
@@ -44,7 +44,7 @@ pub struct Columns<'a, T> {
     /// The columns one after the other, each without its first `skipped` entries.
     pub values: &'a mut [T],
     pub skipped: usize,
-    /// Room for the rows below any supernode, once a column.
+    /// Memory for the rows below any supernode, once per column.
     pub scratch: &'a mut [T],
 }
 
@@ -76,8 +76,8 @@ pub(crate) fn simplicial<T: Scalar>(
         // faer counts the pivots of simplicial factors from one.
         return Err(original(index.saturating_sub(1)));
     }
-    // The caller checks the pivots: LDLᵀ of an indefinite matrix succeeds, and a singular one leaves a pivot of
-    // rounding.
+    // The caller checks the pivots: LDLᵀ of an indefinite matrix succeeds, and a singular one gives a pivot of
+    // rounding size.
     if let SymbolicCholeskyRaw::Simplicial(raw) = symbolic.raw() {
         for (k, &start) in raw.col_ptr()[..symbolic.nrows()].iter().enumerate() {
             pivots[original(k)] = values[start];
@@ -94,7 +94,7 @@ pub(crate) fn scratch<T: Scalar>(symbolic: &SymbolicCholesky<usize>) -> StackReq
     symbolic.factorize_numeric_ldlt_scratch::<T>(Par::Seq, Spec::default())
 }
 
-// In a chain each unknown waits for its neighbor: that one stays in a register, because a round trip through memory
+// In a chain each unknown waits for its neighbor, which therefore stays in a register: a round trip through memory
 // takes longer than the arithmetic.
 
 /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
@@ -120,7 +120,7 @@ pub(crate) fn simplicial_forward<T: Scalar>(factor: &Simplicial<'_, T>, columns:
     }
 }
 
-/// The backward sweep over `columns`; entries behind them hold the solution.
+/// The backward sweep over `columns`; later entries hold the solution.
 #[inline]
 pub(crate) fn simplicial_backward<T: Scalar>(factor: &Simplicial<'_, T>, columns: Range<usize>, x: &mut [T]) {
     let Simplicial { pointers, rows, values, skipped } = *factor;
@@ -136,7 +136,7 @@ pub(crate) fn simplicial_backward<T: Scalar>(factor: &Simplicial<'_, T>, columns
     }
 }
 
-/// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; says whether all pivots were
+/// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; returns whether all pivots were
 /// positive.
 #[inline]
 pub(crate) fn dense<T: Scalar>(size: usize, values: &mut [T], memory: &mut MemBuffer) -> bool {

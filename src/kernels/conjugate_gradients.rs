@@ -28,9 +28,9 @@ pub struct Iteration<'a, T> {
     /// C⁻¹ of each diagonal block C Cᵀ of the matrix.
     pub scaling: &'a [T],
     pub sweeps: Sweeps<'a, T>,
-    /// Of the preconditioned residual, over that of the right-hand side.
+    /// Tolerance of the preconditioned residual, relative to the right-hand side.
     pub tolerance: f64,
-    /// A step that changes the solution by less than this part of it ends the iteration.
+    /// An update smaller than this share of the solution ends the iteration.
     pub resolution: f64,
     pub limit: usize,
 }
@@ -45,7 +45,7 @@ pub struct Vectors<'a, T> {
     pub q: &'a mut [T],
 }
 
-/// How conjugate gradients ended.
+/// Result of conjugate gradients.
 #[derive(Clone, Copy, Debug)]
 pub enum Outcome {
     Converged {
@@ -55,7 +55,7 @@ pub enum Outcome {
         iterations: usize,
         residual: f64,
     },
-    /// `curvature` is pᵀAp over pᵀdiag(A)p of a direction p, `dof` the one with the smallest share of pᵀAp.
+    /// `curvature` is pᵀAp over pᵀdiag(A)p for a direction p, `dof` the one with the smallest share of pᵀAp.
     Indefinite {
         curvature: f64,
         dof: usize,
@@ -94,8 +94,8 @@ fn store<T: Scalar, const B: usize>(block: &Block<T, B>, values: &mut [T]) {
     }
 }
 
-/// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the place of a pivot that is
-/// not larger than the rounding of its diagonal entry.
+/// The inverse of the Cholesky factor of a symmetric block (lower triangle read); `Err` is the index of a pivot that
+/// is at most the rounding of its diagonal entry.
 #[inline]
 fn inverse_factor<T: Scalar, const B: usize>(a: &Block<T, B>) -> Result<Block<T, B>, usize> {
     let mut l = [[T::zero(); B]; B];
@@ -213,7 +213,7 @@ fn backward<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
     }
 }
 
-/// `z = (K Kᵀ)⁻¹ r` with an incomplete factor K: blocks below the diagonal, and the inverses of those on it.
+/// `z = (K Kᵀ)⁻¹ r` with an incomplete factor K: blocks below the diagonal, and the inverses of the diagonal blocks.
 #[inline]
 fn incomplete<T: Scalar, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r: &[T], z: &mut [T]) {
     z.copy_from_slice(r);
@@ -232,8 +232,8 @@ fn incomplete<T: Scalar, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T],
     }
 }
 
-/// Scales a matrix: `values` and `diagonal` hold its blocks and become C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the Cholesky
-/// factors C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
+/// Scales a matrix: `values` and `diagonal` hold its blocks and are replaced by C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the
+/// Cholesky factors C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
 #[inline]
 pub(crate) fn scale<T: Scalar, const B: usize>(
     (pointers, columns): (&[usize], &[u32]),
@@ -263,8 +263,8 @@ pub(crate) fn scale<T: Scalar, const B: usize>(
     Ok(())
 }
 
-/// Incomplete Cholesky factor, in the pattern, of a scaled matrix with `shift` added to its diagonal; says whether all
-/// pivots were positive.
+/// Incomplete Cholesky factor, in the pattern, of a scaled matrix with `shift` added to its diagonal; returns whether
+/// all pivots were positive.
 #[inline]
 pub(crate) fn factorize<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,
@@ -322,10 +322,10 @@ pub(super) struct Judge {
     tolerance: f64,
     /// The squared norm of the right-hand side.
     first: f64,
-    /// Σ α ρ: the square of the solution's length so far, as the matrix measures it (Hestenes and Stiefel, 1952,
-    /// theorem 6:1: directions are orthogonal in that measure).
+    /// Σ α ρ: the squared length of the present solution in the norm of the matrix (Hestenes and Stiefel, 1952,
+    /// theorem 6:1: directions are orthogonal in that norm).
     pub(super) length: f64,
-    /// Squared, as lengths are.
+    /// Squared, like lengths.
     resolution: f64,
     iterations: usize,
     limit: usize,
@@ -340,12 +340,12 @@ impl Judge {
         self.first = first;
     }
 
-    /// After a step α along a direction, ρ before it and after.
+    /// After a step α along a direction, with ρ before and after it.
     pub(super) fn outcome(&mut self, alpha: f64, before: f64, after: f64) -> Option<Outcome> {
         self.iterations += 1;
         let step = alpha * before;
         self.length += step;
-        // The second criterion: nothing sees the change of this step, nor that of any later one.
+        // Second criterion: the change in this step, and in any later one, is below the resolution.
         if after <= self.tolerance.powi(2) * self.first || step <= self.resolution * self.length {
             return Some(Outcome::Converged { iterations: self.iterations });
         }
@@ -354,8 +354,8 @@ impl Judge {
     }
 }
 
-/// Of a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue; below this many units of rounding fewer
-/// than two of its digits are significant: the matrix is singular to working precision.
+/// For a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue. Below this many units of rounding
+/// fewer than two of its digits are significant: the matrix is singular to working precision.
 pub(super) const NEGLIGIBLE: f64 = 64.0;
 
 /// Solves A x = b in place, starting from zero.
@@ -380,7 +380,7 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
         b.fill(T::zero());
         return Outcome::Converged { iterations: 0 };
     }
-    // Scaled by a power of two, which rounds nothing: squares of small forces stay in range.
+    // Scaled by a power of two, without rounding: squares of small forces stay in range.
     #[allow(clippy::cast_possible_truncation)]
     let least = T::min_positive_value().value().log2() as i32 + 8;
     #[allow(clippy::cast_possible_truncation)]
@@ -412,7 +412,7 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
         let shares = p.iter().zip(q.iter()).map(|(&p, &q)| (p * q).value());
         let worst = shares.enumerate().fold((0, f64::INFINITY), |w, (i, x)| if x < w.1 { (i, x) } else { w });
         let curvature = dot(p, q) / dot(p, p);
-        // (A solution beyond all numbers is one of a singular matrix.)
+        // An overflowing solution indicates a singular matrix.
         return Outcome::Indefinite { curvature: if curvature.is_nan() { 0.0 } else { curvature }, dof: worst.0 };
     }
     for ((b, x), inverse) in b.chunks_exact_mut(B).zip(x.chunks_exact(B)).zip(scaling.chunks_exact(B * B)) {
@@ -421,8 +421,8 @@ pub(crate) fn solve<T: Scalar, const B: usize>(
     outcome
 }
 
-/// With the preconditioner (1 + L)(1 + Lᵀ), swept so that a step costs no more than a product (Eisenstat, 1981): in the
-/// variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
+/// With the preconditioner (1 + L)(1 + Lᵀ), in a form in which a step costs only one product (Eisenstat, 1981): in
+/// the variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
 #[inline]
 fn gauss_seidel<T: Scalar, const B: usize>(
     lower: &Blocks<'_, T>,

@@ -1,5 +1,5 @@
-//! Products and eigenvalues of dense matrices in `f64`, by faer's kernels on one thread: the work of an eigensolver
-//! beside its sparse solves.
+//! Products and eigenvalues of dense matrices in `f64`, by faer's kernels on one thread: the dense work of an
+//! eigensolver.
 
 use faer::diag::DiagMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -13,7 +13,7 @@ pub(crate) fn transposed_product(rows: usize, a: &[f64], b: &[f64], out: &mut [f
     let left = MatRef::from_column_major_slice(a, rows, m);
     let right = MatRef::from_column_major_slice(b, rows, n);
     if n < m {
-        // The kernel copies the factor on the left into an order of its own: that with few columns.
+        // The kernel copies the left factor into its own layout, so that should be the one with few columns.
         let mut transposed = vec![0.0; out.len()];
         let product = MatMut::from_column_major_slice_mut(&mut transposed, n, m);
         matmul(product, Accum::Replace, right.transpose(), left, 1.0, Par::Seq);
@@ -33,11 +33,11 @@ pub(crate) fn add_product(factor: f64, rows: usize, a: &[f64], b: &[f64], out: &
     matmul(out, Accum::Add, left, right, factor, Par::Seq);
 }
 
-/// Eigenvalues, ascending, and eigenvectors (column by column, in the same order) of a symmetric matrix of which the
-/// lower triangle is read; none if the iteration does not converge.
+/// Ascending eigenvalues, and eigenvectors (column by column, in the same order), of a symmetric matrix whose lower
+/// triangle is read; `None` if the iteration does not converge.
 pub(crate) fn symmetric_eigen(size: usize, a: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     let (mut values, mut vectors) = (vec![0.0; size], vec![0.0; size * size]);
-    // By QR: faer's divide and conquer (0.24) leaves residuals of 1e-10 where eigenvalues are multiple.
+    // By QR: faer's divide and conquer (0.24) leaves residuals of 1e-10 for multiple eigenvalues.
     let mut parameters = <SelfAdjointEvdParams as Auto<f64>>::auto();
     parameters.recursion_threshold = usize::MAX;
     let parameters = Spec::new(parameters);

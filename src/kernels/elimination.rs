@@ -1,5 +1,5 @@
-//! Which supernodes of a factor are updated by which, and how the numeric factorization goes down the branches of the
-//! elimination forest side by side.
+//! The updates between supernodes of a factor, and the plan of a numeric factorization that processes branches of the
+//! elimination forest in parallel.
 
 use super::forest::supernode_parents;
 use super::plan::{Plan, plan};
@@ -8,21 +8,21 @@ use crate::memory;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
-/// Multiplications that are worth a thread of their own: they take about a millisecond.
+/// Number of multiplications that deserves a thread of its own, about a millisecond.
 const GRAIN: usize = 1 << 22;
 
-/// Which supernodes are updated by which, and the plan of the factorization.
+/// The updates between supernodes, and the plan of the factorization.
 #[derive(Debug)]
 pub(crate) struct Elimination {
     /// The updates of each supernode, ascending, one list after the other.
     updates: Vec<Update>,
     first: Vec<usize>,
-    /// Multiplications that each supernode takes.
+    /// Number of multiplications for each supernode.
     work: Vec<usize>,
     pub(super) plan: Plan,
 }
 
-/// A supernode that updates a later one by some of its rows (times these and those below them).
+/// The update of a later supernode by some rows of a source (times these rows and those below).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
     pub(super) source: usize,
@@ -71,18 +71,18 @@ impl Elimination {
         Ok(Self { updates, first, work, plan })
     }
 
-    /// What updates a supernode.
+    /// The updates of a supernode.
     pub(super) fn updates(&self, s: usize) -> &[Update] {
         &self.updates[self.first[s]..self.first[s + 1]]
     }
 
-    /// Whether a supernode alone is worth several threads.
+    /// Whether a single supernode deserves several threads.
     pub(super) fn is_heavy(&self, s: usize) -> bool {
         self.work[s] >= GRAIN
     }
 }
 
-/// The rows (ascending) in groups that are columns of one supernode each.
+/// Groups of rows (ascending), each of which are columns of one supernode.
 fn of_one_supernode(rows: &[usize], supernode_of: &[usize]) -> impl Iterator<Item = Range<usize>> {
     let mut begin = 0;
     rows.chunk_by(|&a, &b| supernode_of[a] == supernode_of[b]).map(move |group| {

@@ -1,11 +1,11 @@
-//! The elimination forest of a supernodal factor: between which supernodes values pass in a sweep, and which branches
-//! may be swept in parallel.
+//! The elimination forest of a supernodal factor: the supernodes between which a sweep passes values, and the
+//! branches that may be swept in parallel.
 //!
-//! Each supernode has a work vector: its own rows, then those below it. Values pass only between a supernode and its
-//! parent: forward a supernode adds the contributions of its children, backward it gives its children the solution on
-//! the rows below them (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). Branches that have no supernode in common may
-//! therefore be swept at the same time. All sums and their order depend on the factor alone: results are the same bit
-//! for bit on any number of threads.
+//! Each supernode has a work vector: its own rows, then the rows below. Values pass only between a supernode and its
+//! parent: forward, a supernode adds the contributions of its children; backward, it passes its children the solution
+//! on the rows below them (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). Branches without a common supernode may
+//! therefore be swept at the same time. All sums and their order depend only on the factor: results are bitwise the
+//! same on any number of threads.
 
 use super::plan::{Plan, plan};
 use crate::error::Result;
@@ -14,19 +14,20 @@ use crate::threads::GRAIN;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
-/// The supernodes of the interior, and the trees that they form.
+/// The supernodes of the interior, and their trees.
 #[derive(Debug)]
 pub struct Forest {
     /// The first column that is not in the forest.
     pub(crate) end: usize,
-    /// Where the work vector of each supernode begins; one more entry for the end.
+    /// Start of the work vector of each supernode, and the end of the last.
     pub(crate) offsets: Vec<usize>,
     /// The children of each supernode, ascending, one list after the other.
     children: Vec<usize>,
     first_child: Vec<usize>,
-    /// For each row below a supernode, its place in the work vector of the parent; for a root, its distance from `end`.
+    /// For each row below a supernode, its place in the work vector of the parent; for a root, its distance from
+    /// `end`.
     places: Vec<usize>,
-    /// The first column of each supernode; one more entry for `end`.
+    /// The first column of each supernode, and `end`.
     begins: Vec<usize>,
     /// Supernodes without a parent in the forest, ascending.
     pub(crate) roots: Vec<usize>,
@@ -34,7 +35,7 @@ pub struct Forest {
 }
 
 impl Forest {
-    /// The supernodes whose columns all lie before `interior`.
+    /// The supernodes whose columns all precede `interior`.
     pub(crate) fn new(symbolic: &SymbolicSupernodalCholesky<usize>, interior: usize) -> Result<Self> {
         let count = symbolic.supernode_end().partition_point(|&end| end <= interior);
         let mut begins = symbolic.supernode_begin()[..count].to_vec();
@@ -89,7 +90,7 @@ impl Forest {
         Ok(places)
     }
 
-    /// Scalars in the work vectors of all supernodes.
+    /// Total number of scalars in the work vectors.
     pub(crate) fn work(&self) -> usize {
         self.offsets.last().copied().unwrap_or(0)
     }
@@ -99,7 +100,7 @@ impl Forest {
         self.begins.len() - 1
     }
 
-    /// Where the rows below a supernode are in the array of all work vectors.
+    /// The range of the rows below a supernode in the array of all work vectors.
     #[inline]
     pub(crate) fn update(&self, s: usize) -> Range<usize> {
         self.offsets[s] + self.size(s)..self.offsets[s + 1]
@@ -111,7 +112,7 @@ impl Forest {
         self.begins[s]..self.begins[s + 1]
     }
 
-    /// How many columns a supernode has.
+    /// Number of columns of a supernode.
     #[inline]
     pub(crate) fn size(&self, s: usize) -> usize {
         self.begins[s + 1] - self.begins[s]
@@ -122,7 +123,7 @@ impl Forest {
         &self.children[self.first_child[s]..self.first_child[s + 1]]
     }
 
-    /// Where the rows below a supernode are in the work vector of its parent; for a root, their distances from `end`.
+    /// Places of the rows below a supernode in the work vector of its parent; for a root, their distances from `end`.
     #[inline]
     pub(crate) fn places(&self, s: usize) -> &[usize] {
         &self.places[self.below(s)]
@@ -133,13 +134,13 @@ impl Forest {
         self.offsets[s] - self.begins[s]..self.offsets[s + 1] - self.begins[s + 1]
     }
 
-    /// Scalars that a sweep reads of a supernode.
+    /// Number of scalars that a sweep reads from a supernode.
     fn reads(&self, s: usize) -> usize {
         self.size(s) * (self.offsets[s + 1] - self.offsets[s])
     }
 }
 
-/// The parent of each of the first supernodes; `count` where it is none of these.
+/// The parent of each of the first `count` supernodes; `count` if it is not among them.
 pub(super) fn supernode_parents(symbolic: &SymbolicSupernodalCholesky<usize>, count: usize) -> Vec<usize> {
     let ends = &symbolic.supernode_end()[..count];
     let parent =
@@ -147,7 +148,7 @@ pub(super) fn supernode_parents(symbolic: &SymbolicSupernodalCholesky<usize>, co
     (0..count).map(|s| parent(s).unwrap_or(count)).collect()
 }
 
-/// The children of each parent, and where the list of each begins; a parent out of range has no list.
+/// The children of each parent, and the start of each list; a parent out of range has no list.
 fn lists(parents: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let count = parents.len();
     let mut first = vec![0; count + 1];
@@ -174,7 +175,7 @@ mod tests {
     use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
     use faer::sparse::{SparseColMat, Triplet};
 
-    /// The factor of a grid with 27 neighbors, the dofs of one face last.
+    /// The factor of a grid with 27 neighbors per vertex, with the dofs of one edge last.
     fn grid(sides: [usize; 3], ordering: &Ordering) -> (SymbolicCholesky<usize>, usize) {
         let n = sides.iter().product();
         let place = |dof: usize| [dof % sides[0], dof / sides[0] % sides[1], dof / (sides[0] * sides[1])];

@@ -1,12 +1,12 @@
-//! How many eigenvalues of a sparse symmetric matrix are negative, from its factors (Sylvester's law of inertia).
+//! Number of negative eigenvalues of a sparse symmetric matrix, from its factors (Sylvester's law of inertia).
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::{Par, Side, Spec};
 
-/// Counts them in L B Lᵀ with B of blocks of one and two, pivots exchanged within supernodes (Bunch and Kaufman); a
-/// block of two has one eigenvalue of either sign. None if there is no memory or a pivot is not finite.
+/// Counts them in L B Lᵀ with B of blocks of one and two, with pivoting within supernodes (Bunch and Kaufman); a
+/// block of two has one eigenvalue of either sign. `None` if there is no memory or a pivot is not finite.
 pub(crate) fn negative_eigenvalues(
     symbolic: &SymbolicCholesky<usize>,
     a: SparseColMatRef<'_, usize, f64>,
@@ -43,7 +43,7 @@ pub(crate) fn negative_eigenvalues(
     }
     let (mut negative, mut k) = (0, 0);
     while k < n {
-        // (Entries beside the diagonal are written for supernodal factors alone.)
+        // Only supernodal factors write off-diagonal entries.
         if beside[k] != 0.0 {
             (negative, k) = (negative + 1, k + 2);
         } else if pivots[k].is_finite() && pivots[k] != 0.0 {

@@ -1,8 +1,8 @@
-//! Sweeps over a supernodal factor for a few right-hand sides side by side: the entries of a row lie next to one
-//! another, so that every entry of L is read once for all of them, and multiplies a whole vector at a time.
+//! Sweeps over a supernodal factor for several interleaved right-hand sides: the entries of a row are adjacent in
+//! memory, so every entry of L is read once for all of them and multiplies a whole vector.
 //!
-//! Where a factor is larger than the caches the time of a solve is that of reading it: eight right-hand sides take a
-//! little longer than one.
+//! If a factor exceeds the caches, the time of a solve is the time to read it: eight right-hand sides take little
+//! longer than one.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the vector units
 
 use super::cholesky::Supernodal;
@@ -10,21 +10,21 @@ use super::sweep::Panel;
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-/// Columns of a supernode that are processed together: with eight right-hand sides what they multiply stays in
+/// Columns of a supernode that are processed together: with eight right-hand sides their multipliers stay in
 /// registers.
 const GROUP: usize = 4;
 
-/// Right-hand sides at a time, and those of a narrower sweep.
+/// Number of right-hand sides in a sweep, and in a narrower one.
 pub(crate) const WIDEST: usize = 8;
 const NARROW: usize = 4;
 
-/// Rows of `WIDEST` values that a solve needs: the vectors, and the rows of the tallest supernode.
+/// Number of rows of `WIDEST` values for a solve: the vectors, and the rows of the tallest supernode.
 pub(crate) fn room(dofs: usize, tallest: usize) -> usize {
     dofs + tallest
 }
 
-/// Solves in place for the columns of `rhs`, at most `WIDEST`. `order` lists the dofs as they are eliminated; `memory`
-/// is as large as [`room`] says.
+/// Solves in place for the columns of `rhs`, at most `WIDEST`. `order` lists the dofs in elimination order; `memory`
+/// has the size returned by [`room`].
 #[inline]
 pub(crate) fn solve<T: Scalar>(factor: &Supernodal<'_, T>, order: Option<&[usize]>, rhs: &mut [T], memory: &mut [T]) {
     match rhs.len() <= NARROW * factor.symbolic.nrows() {
@@ -111,7 +111,7 @@ fn substitute<T: Scalar, const W: usize, const N: usize>(
 
 /// The small triangle, column by column, then the rows below it: `w −= Σ l_k w_k`.
 struct Eliminate<'a, T, const W: usize, const N: usize> {
-    /// The columns, all from the row of the first one on, as `w`.
+    /// The columns, starting at the row of the first one, like `w`.
     l: [&'a [T]; N],
     w: &'a mut [[T; W]],
 }

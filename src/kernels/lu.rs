@@ -14,7 +14,7 @@ pub enum Side {
     Transposed,
 }
 
-/// Factorizes with partial pivoting; a failure says at which column of the order of elimination.
+/// Factorizes with partial pivoting; the error has the failing column in the elimination order.
 #[inline]
 pub(crate) fn factorize<T: Scalar>(
     symbolic: &SymbolicLu<usize>,

@@ -1,21 +1,21 @@
-//! Which branches of an elimination forest may be visited in parallel, cut so that threads have about the same to do.
+//! Which branches of an elimination forest may be visited in parallel, cut into similar amounts of work for threads.
 
 use std::ops::Range;
 
 /// The order of a visit: upward from the branches to the stem, downward from the stem to the branches.
 #[derive(Debug)]
 pub(crate) enum Plan {
-    /// Supernodes one after the other.
+    /// Supernodes in sequence.
     Serial(Range<usize>),
-    /// A branch (all supernodes before those of the stem), then the stem: one supernode after the other, each of which
-    /// several threads may share.
+    /// A branch (all supernodes before the stem), then the stem: supernodes in sequence, each of which several
+    /// threads may share.
     Stem(Box<Plan>, Range<usize>),
-    /// Two branches without a common supernode; the second one begins with this supernode.
+    /// Two branches without a common supernode; the second one starts with this supernode.
     Fork(Box<[Plan; 2]>, usize),
 }
 
-/// A plan for all supernodes, given the parent of each (one out of range for a root) and its weight. Branches of less
-/// weight than `grain` are not cut off.
+/// A plan for all supernodes, given the parent of each (out of range for a root) and its weight. Branches lighter
+/// than `grain` are not cut off.
 pub(super) fn plan(parents: &[usize], weights: &[usize], grain: usize) -> Plan {
     Planner::new(parents, weights, grain).plan(0..parents.len())
 }
@@ -23,11 +23,11 @@ pub(super) fn plan(parents: &[usize], weights: &[usize], grain: usize) -> Plan {
 /// Cuts a forest into branches.
 struct Planner<'f> {
     parents: &'f [usize],
-    /// Weight of all supernodes before each one.
+    /// Total weight of the supernodes before each one.
     weight_before: Vec<usize>,
-    /// For each supernode the first one of its branch, if the branch is contiguous; else nothing.
+    /// For each supernode the first one of its branch if the branch is contiguous, otherwise `None`.
     first: Vec<Option<usize>>,
-    /// The least weight that is worth a thread of its own.
+    /// The least weight that deserves a thread of its own.
     grain: usize,
 }
 
@@ -56,7 +56,7 @@ impl<'f> Planner<'f> {
         if self.weight(&range) < 2 * self.grain {
             return Plan::Serial(range);
         }
-        // The stem: the root while only one tree is left, and trees that are not worth a thread.
+        // The stem: the root while only one tree is left, and trees too light for a thread.
         let mut end = range.end;
         while let Some(first) = end.checked_sub(1).filter(|last| *last >= range.start).and_then(|last| self.first[last])
         {
@@ -74,12 +74,12 @@ impl<'f> Planner<'f> {
         if end == range.end { plan } else { Plan::Stem(Box::new(plan), end..range.end) }
     }
 
-    /// The supernode that splits a forest into two of about the same weight, both worth a thread.
+    /// The supernode that splits a forest into two of similar weight, both heavy enough for a thread.
     fn cut(&self, range: &Range<usize>) -> Option<usize> {
-        // From the last tree to the first one.
+        // From the last tree to the first.
         let (mut cuts, mut end) = (Vec::new(), range.end);
         while end > range.start {
-            // A tree that is not contiguous ends the search: it cannot be separated from those before it.
+            // A tree that is not contiguous ends the search: it cannot be separated from earlier trees.
             let Some(first) = self.first[end - 1].filter(|first| *first >= range.start) else { break };
             cuts.push(first);
             end = first;

@@ -39,7 +39,7 @@ pub(crate) fn symmetric_product<T: Scalar>(
     }
 }
 
-/// A tridiagonal symmetric matrix: the diagonal, and the entries beside it.
+/// A tridiagonal symmetric matrix: the diagonal, and the off-diagonal entries.
 #[derive(Clone, Copy, Debug)]
 pub struct Tridiagonal<'a, T> {
     pub diagonal: &'a [T],
@@ -93,32 +93,32 @@ impl<T: Scalar> WithSimd for TridiagonalProduct<'_, T> {
     }
 }
 
-/// Consecutive columns of one pattern (a supervariable, or a part of one), in which every column has entries on all of
-/// them: the dofs of a node, mostly.
+/// Consecutive columns with one pattern (a supervariable, or a part of one), each with entries on all of them:
+/// usually the dofs of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supervariable {
     /// The first column.
     pub column: u32,
     /// How many columns: one to three.
     pub width: u8,
-    /// The rows below the columns come in groups of so many consecutive ones: the width, or one.
+    /// The rows below the columns form groups of this many consecutive rows: the width, or one.
     pub group: u8,
-    /// Where the list of these groups begins; it ends where the next one begins.
+    /// Start of the list of these groups; it ends at the start of the next one.
     pub first: u32,
 }
 
-/// Some columns of a symmetric matrix (both triangles stored), of which the entries from the diagonal down are read.
+/// Some columns of a symmetric matrix (both triangles stored), read from the diagonal down.
 #[derive(Clone, Copy, Debug)]
 pub struct LowerColumns<'a, T> {
     pub matrix: SparseColMatRef<'a, usize, T>,
-    /// Those of the columns, and the one that follows.
+    /// The supervariables of the columns, and the following one.
     pub supervariables: &'a [Supervariable],
     /// The first rows of the groups of all supervariables of the matrix.
     pub groups: &'a [u32],
 }
 
-/// `y += c A x` with the part of a symmetric A that has entries in these columns, at and below the diagonal, and their
-/// mirror images. `y` begins at the first of the columns.
+/// `y += c A x` for the entries of a symmetric A in these columns, at and below the diagonal, and their mirror
+/// images. `y` starts at the first of the columns.
 #[inline]
 pub(crate) fn lower_product<T: Scalar>(c: T, columns: LowerColumns<'_, T>, x: &[T], y: &mut [T]) {
     Arch::new().dispatch(LowerProduct { c, columns, x, y });
@@ -153,13 +153,13 @@ impl<T: Scalar> WithSimd for LowerProduct<'_, T> {
 }
 
 impl<T: Scalar> LowerProduct<'_, T> {
-    /// W columns, whose rows below come in groups of G. Each entry is read once for its row and for its column.
+    /// W columns, whose rows below form groups of G. Each entry is read once for its row and its column.
     #[inline(always)]
     fn supervariable<const W: usize, const G: usize>(&mut self, column: usize, groups: &[u32], start: usize) {
         let Self { c, columns, x, y } = self;
         let (pointers, values) = (columns.matrix.col_ptr(), columns.matrix.val());
         let below = groups.len() * G;
-        // (The entries of a column are in ascending order of rows: the last ones are those below.)
+        // The entries of a column are in ascending order of rows: the last ones are below the block.
         let tails: [&[T]; W] = std::array::from_fn(|k| {
             let end = pointers[column + k + 1];
             &values[end - below - W..end]

@@ -1,8 +1,8 @@
-//! Conjugate gradients for several right-hand sides side by side: each row of a sweep waits for those before it, and
-//! the other right-hand sides take place in that time.
+//! Conjugate gradients for several right-hand sides together: each row of a sweep waits for earlier ones, and the
+//! other right-hand sides use that time.
 //!
-//! Compiled for the vector units of the machine that it runs on. What one right-hand side gets does not depend on the
-//! others, nor on the machine: no product is fused with its sum.
+//! Compiled for the vector units of the machine that it runs on. The result for one right-hand side does not depend
+//! on the others or on the machine: no product is fused with its sum.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
 
 use super::conjugate_gradients::{Blocks, Judge, NEGLIGIBLE, Outcome};
@@ -12,10 +12,10 @@ use faer::traits::pulp::{Arch, Simd, WithSimd};
 /// The number of right-hand sides.
 pub(crate) const LANES: usize = 4;
 
-/// An entry of each of them.
+/// One entry of each right-hand side.
 pub(crate) type Lanes<T> = [T; LANES];
 
-/// Vectors of conjugate gradients: the solution, the right-hand side, which is overwritten, and three to work with.
+/// Vectors of conjugate gradients: the solution, the right-hand side, which is overwritten, and three work vectors.
 #[derive(Debug)]
 pub struct SideVectors<'a, T> {
     pub x: &'a mut [Lanes<T>],
@@ -26,8 +26,8 @@ pub struct SideVectors<'a, T> {
 }
 
 /// Solves (1 + L + Lᵀ) x = r, with single entries as blocks of L, by the method of
-/// [`Sweeps::GaussSeidel`](super::conjugate_gradients::Sweeps::GaussSeidel). It ends, for each right-hand side by
-/// itself, with a step below a part of the solution, and fails after so many iterations.
+/// [`Sweeps::GaussSeidel`](super::conjugate_gradients::Sweeps::GaussSeidel). For each right-hand side it ends when an
+/// update is below a share of the solution, and fails at the iteration limit; `ends` holds both.
 #[inline]
 pub(crate) fn solve<T: Scalar>(
     lower: &Blocks<'_, T>,
@@ -146,7 +146,7 @@ impl<T: Scalar> WithSimd for Solve<'_, T> {
             accumulate(x, x, &mut lengths);
         }
         std::array::from_fn(|l| match outcomes[l] {
-            // (As for one right-hand side: singular to working precision.)
+            // As for one right-hand side: singular to working precision.
             Some(Outcome::Converged { iterations }) if iterations > 0 => {
                 let bound = NEGLIGIBLE * T::epsilon().value() * lengths[l];
                 match judges[l].length <= bound {

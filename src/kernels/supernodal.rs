@@ -1,9 +1,9 @@
-//! The numeric factorization A = L Lᵀ by supernodes, looking left: each supernode takes the updates of all before it,
-//! then is factorized as a dense trapezoid (Ng and Peyton, SIAM J. Sci. Comput. 14, 1993).
+//! The left-looking numeric factorization A = L Lᵀ by supernodes: each supernode is updated by all earlier ones, then
+//! factorized as a dense trapezoid (Ng and Peyton, SIAM J. Sci. Comput. 14, 1993).
 //!
-//! Branches of the elimination forest touch nothing in common and go side by side. The large supernodes behind them are
-//! cut into tiles, which go side by side too. Tiles, and what is summed in which order, are a matter of the factor
-//! alone: results are the same bit for bit on any number of threads.
+//! Branches of the elimination forest are independent and processed in parallel. The large supernodes after them are
+//! cut into tiles, which are processed in parallel too. Tiles and the order of sums depend only on the factor:
+//! results are bitwise the same on any number of threads.
 
 mod dense;
 #[cfg(test)]
@@ -25,35 +25,35 @@ use std::ops::Range;
 
 /// Columns of a supernode that are updated together.
 const TILE: usize = 128;
-/// Columns that are factorized before those behind them are updated.
+/// Columns that are factorized before later ones are updated.
 const PANEL: usize = 128;
-/// Rows that are multiplied at once: their product with a tile stays in the cache.
+/// Rows that are multiplied together: their product with a tile stays in the cache.
 const ROWS: usize = 480;
-/// Columns of a source that are multiplied at once: with more of them faer's kernel slows down to half its speed.
+/// Columns of a source that are multiplied together: with more of them faer's kernel drops to half its speed.
 const DEPTH: usize = 128;
 
-/// Runs of this length and longer are subtracted one after the other, shorter ones row by row.
+/// Runs of at least this length are subtracted one by one, shorter ones row by row.
 const LONG: usize = 16;
 
-/// Of products as wide as this and wider, the upper triangle is left out.
+/// Products of at least this width omit the upper triangle.
 const TRIANGLE: usize = 64;
 
-/// Rows of a product that follow each other in the supernode that takes it.
+/// Rows of a product that are consecutive in the updated supernode.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     begin: usize,
     end: usize,
-    /// Where the first one is in the supernode.
+    /// Place of the first row in the supernode.
     place: usize,
 }
 
-/// What one thread needs besides the factor.
+/// Workspace of one thread for a factorization.
 pub struct Workspace<T> {
-    /// The product of some rows with a tile, and where it goes.
+    /// The product of some rows with a tile, and its places.
     product: Vec<T>,
     places: Vec<usize>,
     runs: Vec<Run>,
-    /// For each row of the supernode at hand, its place there; others keep places of earlier ones.
+    /// For each row of the present supernode its place there; other rows keep places in earlier ones.
     place_of: Vec<usize>,
     /// Scratch of faer's dense factorization.
     memory: MemBuffer,
@@ -65,7 +65,7 @@ impl<T> std::fmt::Debug for Workspace<T> {
     }
 }
 
-/// For factors of so many dofs; nothing if there is no memory.
+/// For factors with this many dofs; `None` if there is no memory.
 #[inline]
 pub(crate) fn workspace<T: Scalar>(dofs: usize) -> Option<Workspace<T>> {
     let mut place_of = Vec::new();
@@ -84,13 +84,13 @@ pub(crate) fn workspace<T: Scalar>(dofs: usize) -> Option<Workspace<T>> {
     })
 }
 
-/// A matrix, and what its factorization goes by.
+/// A matrix, and the data for its factorization.
 #[derive(Debug)]
 pub struct Problem<'a, T> {
     pub(crate) symbolic: &'a SymbolicSupernodalCholesky<usize>,
     pub(crate) elimination: &'a Elimination,
     pub(crate) a: SparseColMatRef<'a, usize, T>,
-    /// The dof of each column of the factor, and the column of each dof; nothing where they are the same.
+    /// The dof of each column of the factor, and the column of each dof; `None` if they are the same.
     pub(crate) order: Option<(&'a [usize], &'a [usize])>,
     pub(crate) workspaces: &'a PerThread<Workspace<T>>,
 }
@@ -111,13 +111,13 @@ pub(crate) fn factorize<T: Scalar>(problem: &Problem<'_, T>, values: &mut [T], p
     Ok(())
 }
 
-/// A factorization under way.
+/// A running factorization.
 struct Visit<'a, T> {
     problem: &'a Problem<'a, T>,
 }
 
 impl<T: Scalar> Visit<'_, T> {
-    /// `values` begin with those of supernode `from`.
+    /// `values` start with those of supernode `from`.
     fn by_plan(&self, plan: &Plan, from: usize, values: &mut [T]) -> Result<(), usize> {
         match plan {
             Plan::Serial(range) => {
@@ -143,7 +143,7 @@ impl<T: Scalar> Visit<'_, T> {
         }
     }
 
-    /// One supernode after the other.
+    /// Processes supernodes in sequence.
     fn serial(
         &self,
         range: Range<usize>,
@@ -162,7 +162,7 @@ impl<T: Scalar> Visit<'_, T> {
         Ok(())
     }
 
-    /// One supernode, its tiles side by side.
+    /// Processes one supernode, with its tiles in parallel.
     fn heavy(&self, s: usize, from: usize, values: &mut [T]) -> Result<(), usize> {
         let (target, own) = self.target(s, from, values);
         threads::each_chunk(Threads::All, own, TILE * target.height, &|tile, columns| {
@@ -176,7 +176,7 @@ impl<T: Scalar> Visit<'_, T> {
         })
     }
 
-    /// A supernode, and its columns; `values` begin with those of supernode `from`.
+    /// A supernode and its columns; `values` start with those of supernode `from`.
     fn target<'v>(&'v self, s: usize, from: usize, values: &'v mut [T]) -> (Target<'v, T>, &'v mut [T]) {
         let places = self.problem.symbolic.col_ptr_for_val();
         let (done, own) = values.split_at_mut(places[s] - places[from]);
@@ -197,15 +197,15 @@ struct Target<'a, T> {
     columns: Range<usize>,
     /// The rows below the columns.
     pattern: &'a [usize],
-    /// Entries of a column.
+    /// Number of entries of a column.
     height: usize,
-    /// The values of the supernodes before, from supernode `from` on.
+    /// The values of the earlier supernodes, from supernode `from` on.
     done: &'a [T],
     from: usize,
 }
 
 impl<T: Scalar> Target<'_, T> {
-    /// Tells its rows where they are.
+    /// Stores the place of each of its rows.
     fn enter(&self, place_of: &mut [usize]) {
         for (&row, place) in self.pattern.iter().zip(self.columns.len()..) {
             place_of[row] = place;
@@ -215,7 +215,7 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
-    /// Whether a row is at a place that was told by [`enter`](Self::enter), perhaps of another supernode.
+    /// Whether a row has a place stored by [`enter`](Self::enter), which may belong to another supernode.
     fn is_row(&self, row: usize, place: usize) -> bool {
         match place.checked_sub(self.columns.len()) {
             None => self.columns.start + place == row,
@@ -223,7 +223,7 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
-    /// Brings A and the updates of all supernodes before into the columns of a tile.
+    /// Writes A and the updates by all earlier supernodes into the columns of a tile.
     fn update(&self, tile: usize, own: &mut [T], workspace: &mut Workspace<T>) {
         let start = self.columns.start + tile * TILE;
         let columns = start..start + own.len() / self.height;
@@ -248,8 +248,8 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
-    /// The lower triangle of A. (A is symmetric: its columns are read in place of its rows. An entry that is zero to
-    /// rounding may have no partner across the diagonal, and then no place in the factor.)
+    /// Adds the lower triangle of A. A is symmetric, so its columns are read as rows. An entry that is zero to
+    /// rounding may have no partner across the diagonal, and then no place in the factor.
     fn add_matrix(&self, columns: Range<usize>, own: &mut [T], place_of: &[usize]) {
         let a = self.problem.a;
         for (column, own) in columns.zip(own.chunks_exact_mut(self.height)) {
@@ -265,7 +265,7 @@ impl<T: Scalar> Target<'_, T> {
     }
 
     /// Subtracts the product of a supernode's `rows` with the first `width` of them, which are columns of the tile
-    /// that begins with column `start`.
+    /// starting at column `start`.
     fn subtract(
         &self,
         source: MatRef<'_, T>,
@@ -319,7 +319,7 @@ impl<T: Scalar> Target<'_, T> {
         }
     }
 
-    /// Factorizes the trapezoid, looking right: panel by panel, each of which then updates the columns behind it.
+    /// Factorizes the trapezoid, right-looking: panel by panel, each of which then updates the later columns.
     fn factorize(
         &self,
         own: &mut [T],
@@ -344,7 +344,7 @@ impl<T: Scalar> Target<'_, T> {
         Ok(())
     }
 
-    /// Subtracts what a panel contributes to some columns behind it, of which `first` is the first one.
+    /// Subtracts the contribution of a panel to some later columns, the first of which is `first`.
     fn update_behind(&self, panel: MatRef<'_, T>, first: usize, columns: &mut [T]) {
         let width = columns.len() / self.height;
         let columns = MatMut::from_column_major_slice_mut(columns, self.height, width);
@@ -355,7 +355,7 @@ impl<T: Scalar> Target<'_, T> {
     }
 }
 
-/// Where the rows of a chunk are in the supernode at hand.
+/// Finds the places of the rows of a chunk in the present supernode.
 fn find_places(rows: &[usize], place_of: &[usize], places: &mut Vec<usize>, runs: &mut Vec<Run>) {
     places.clear();
     places.extend(rows.iter().map(|&row| place_of[row]));

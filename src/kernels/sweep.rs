@@ -1,11 +1,11 @@
 //! Sweeps over a supernodal factor for one right-hand side, at the speed of reading the factor once.
 //!
 //! Eight columns of a supernode are processed together: every entry of L is read once, every entry of the vector an
-//! eighth as often. The inner loops are functions of their own, compiled for the vector units of the machine that they
-//! run on. (Inlined into larger functions, they are not always vectorized.)
+//! eighth as often. The inner loops are separate functions, compiled for the vector units of the machine that they
+//! run on; inlined into larger functions, they are not always vectorized.
 //!
-//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`, which
-//! also share out large supernodes.
+//! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`,
+//! which also share large supernodes.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
 
 use super::cholesky::{Columns, Supernodal, supernodes};
@@ -19,9 +19,8 @@ use std::ops::Range;
 /// Partial sums of a dot product.
 const LANES: usize = 8;
 
-/// Columns of a heavy panel that are swept before threads share out what lies below them; the fewest rows that are
-/// worth a share forward, and columns of a share backward. (Multiples of eight: groups of columns are the same in all
-/// parts.)
+/// Columns of a heavy panel that are swept before threads share the rows below; the fewest rows in a share forward,
+/// and columns in a share backward. Multiples of eight, so that groups of columns are the same in all parts.
 const BLOCK: usize = 128;
 const ROWS: usize = 256;
 const SHARE: usize = 16;
@@ -33,8 +32,8 @@ pub(crate) struct Interior<'a, T> {
     pub(crate) forest: &'a Forest,
 }
 
-/// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, and behind them
-/// its contribution to the parent. `b` is the right-hand side; column k reads its entry `order[k]`, or k without an
+/// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, followed by its
+/// contribution to the parent. `b` is the right-hand side; column k reads its entry `order[k]`, or k without an
 /// order.
 pub(crate) fn forest_forward<T: Scalar>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
     forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
@@ -46,14 +45,14 @@ pub(crate) fn forest_backward<T: Scalar>(interior: &Interior<'_, T>, w: &mut [T]
     backward_plan(&interior.forest.plan, interior, 0, w);
 }
 
-/// What forward sweeps read.
+/// Input of forward sweeps.
 struct Forward<'a, T> {
     interior: &'a Interior<'a, T>,
     b: &'a [T],
     order: Option<&'a [usize]>,
 }
 
-/// `w` begins with the work vector of supernode `from`.
+/// `w` starts with the work vector of supernode `from`.
 fn forward_plan<T: Scalar>(plan: &Plan, forward: &Forward<'_, T>, from: usize, w: &mut [T]) {
     match plan {
         Plan::Serial(range) => forward_serial(forward, range.clone(), from, w),
@@ -137,9 +136,9 @@ pub(super) struct Panel<'a, T> {
     pub(super) size: usize,
     /// Rows from the diagonal entry of the first column down.
     pub(super) rows: usize,
-    /// Entries of a column of the whole supernode.
+    /// Number of entries of a column of the whole supernode.
     stride: usize,
-    /// The columns, `stride` apart, from the diagonal entry of the first one on.
+    /// The columns, `stride` apart, starting at the diagonal entry of the first one.
     values: &'a [T],
     /// The rows below the columns of the whole supernode.
     pub(super) pattern: &'a [usize],
@@ -159,13 +158,13 @@ impl<'a, T> Panel<'a, T> {
         Self { start, size: end - start, rows, stride, values: &factor.values[first..last], pattern }
     }
 
-    /// Column j from its row `from` on.
+    /// Column j, starting at its row `from`.
     #[inline]
     pub(super) fn column(&self, j: usize, from: usize) -> &'a [T] {
         &self.values[j * self.stride + from..j * self.stride + self.rows]
     }
 
-    /// How many of the rows are columns of the supernode; the others are `pattern`.
+    /// Number of rows that are columns of the supernode; the others are `pattern`.
     #[inline]
     fn leading(&self) -> usize {
         self.rows - self.pattern.len()
@@ -180,13 +179,13 @@ impl<'a, T> Panel<'a, T> {
 }
 
 impl<T: Scalar> Panel<'_, T> {
-    /// Eliminates the columns: `w` has their right-hand sides, then those of the rows below.
+    /// Eliminates the columns: `w` holds their right-hand sides, followed by those of the rows below.
     fn forward(&self, arch: Arch, w: &mut [T]) {
         let threads = if self.is_heavy() { threads::count() } else { 1 };
         if threads == 1 {
             return self.eliminate(arch, 0..self.size, w);
         }
-        // Each row has the same sum, whatever the blocks and shares.
+        // Each row has the same sum for any blocks and shares.
         for columns in parts(&(0..self.size), BLOCK) {
             let (done, below) = w.split_at_mut(columns.end);
             self.eliminate(arch, columns.clone(), done);
@@ -197,13 +196,13 @@ impl<T: Scalar> Panel<'_, T> {
         }
     }
 
-    /// Solves for the columns: `w` has their right-hand sides, then the solution on the rows below.
+    /// Solves for the columns: `w` holds their right-hand sides, followed by the solution on the rows below.
     fn backward(&self, arch: Arch, w: &mut [T]) {
         if !self.is_heavy() {
             return self.substitute(arch, 0..self.size, w);
         }
-        // The sums of each column end with the block that it is in, with one thread as well; this one goes from group
-        // to group, to read memory in its order.
+        // The sums of each column end with its block, with one thread as well. One thread proceeds group by group, to
+        // read memory in order.
         let width = if threads::count() == 1 { 8 } else { BLOCK };
         let mut sums = [T::zero(); BLOCK];
         for block in parts(&(0..self.size), BLOCK).rev() {
@@ -219,7 +218,7 @@ impl<T: Scalar> Panel<'_, T> {
         }
     }
 
-    /// Whether the panel is worth more than one thread.
+    /// Whether the panel deserves more than one thread.
     fn is_heavy(&self) -> bool {
         self.rows * self.size >= GRAIN
     }
@@ -240,7 +239,7 @@ impl<T: Scalar> Panel<'_, T> {
         (columns.start..eights).rev().step_by(8).for_each(|last| self.substitute_group::<8>(arch, last - 7, w));
     }
 
-    /// Subtracts the eliminated columns, whose unknowns are in `x`, from the rows `y` that begin at row `from`.
+    /// Subtracts the eliminated columns, whose unknowns are in `x`, from the rows `y` that start at row `from`.
     fn subtract(&self, arch: Arch, columns: Range<usize>, x: &[T], from: usize, y: &mut [T]) {
         let [eights, fours] = groups(&columns);
         (columns.start..eights).step_by(8).for_each(|column| self.subtract_group::<8>(arch, column, x, from, y));
@@ -248,8 +247,8 @@ impl<T: Scalar> Panel<'_, T> {
         (fours..columns.end).for_each(|column| self.subtract_group::<1>(arch, column, x, from, y));
     }
 
-    /// Products of the columns from `first` on, one for each of the `sums`, and the solution `x` on the rows from
-    /// `from` on.
+    /// Products of the columns starting at `first`, one for each of the `sums`, with the solution `x` on the rows
+    /// starting at `from`.
     fn dots(&self, arch: Arch, first: usize, from: usize, x: &[T], sums: &mut [T]) {
         let mut column = first;
         let (eights, rest) = sums.as_chunks_mut();
@@ -309,7 +308,7 @@ impl<T: Scalar> Panel<'_, T> {
     }
 }
 
-/// A range in parts of so many columns; the last one may have fewer.
+/// Splits a range into parts of `width` columns; the last one may have fewer.
 fn parts(columns: &Range<usize>, width: usize) -> impl DoubleEndedIterator<Item = Range<usize>> + use<> {
     let Range { start, end } = *columns;
     (0..columns.len().div_ceil(width)).map(move |part| start + part * width..(start + (part + 1) * width).min(end))
@@ -341,7 +340,7 @@ pub(super) fn forward<T: Scalar>(
     }
 }
 
-/// Backward over `columns` for one right-hand side; entries behind them hold the solution.
+/// Backward over `columns` for one right-hand side; later entries hold the solution.
 pub(super) fn backward<T: Scalar>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,

@@ -1,13 +1,13 @@
-//! Passes over vectors.
+//! Loops over vectors.
 //!
-//! `combine` and `recover` are compiled for the vector units of the machine that they run on. Their results are the
-//! same bit for bit on any machine: no product is fused with its sum.
+//! `combine` and `recover` are compiled for the vector units of the machine that they run on. Their results are
+//! bitwise the same on any machine: no product is fused with its sum.
 #![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
 
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
 
-/// Whether a pass adds to what is there.
+/// Whether a pass adds to the present values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Accumulate {
     Replace,
@@ -44,7 +44,7 @@ pub(crate) fn combine<T: Scalar>(terms: &[(T, &[T])], differences: &[(T, &[T])],
     Arch::new().dispatch(Combine(terms, differences, y, out));
 }
 
-/// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; says whether what was written is finite.
+/// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; returns whether the written values are finite.
 #[inline]
 pub(crate) fn recover<T: Scalar>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], a: Accumulate) -> bool {
     Arch::new().dispatch(Recover(weights, d, motion, a))
@@ -145,7 +145,7 @@ pub(crate) fn all_finite<T: Scalar>(x: &[T]) -> bool {
     sums.into_iter().sum::<T>() + rest == T::zero()
 }
 
-/// The largest |x|; NaN is passed over.
+/// The largest |x|; NaN is ignored.
 #[inline(always)]
 pub(crate) fn largest<T: Scalar>(x: &[T]) -> T {
     let mut most = [T::zero(); LANES];
@@ -275,7 +275,7 @@ fn recover_blocks<T: Scalar>(weights: [T; 3], d: &[T], motion: [&mut [T]; 3], ac
 mod tests {
     use super::{Accumulate, recover};
 
-    /// The blocks of a recovery give what one loop gives, bit for bit, and find what is not finite in any of them.
+    /// The blocks of a recovery give bitwise the same as one loop, and detect non-finite values in any of them.
     #[test]
     fn recovery_in_blocks_is_one_loop() {
         let vector = |seed: usize, n: usize| -> Vec<f64> { (0..n).map(|i| ((seed + 5 * i) as f64).sin()).collect() };

@@ -1,4 +1,4 @@
-//! A factorization for each body: the connected components of a matrix, one by one.
+//! A separate factorization for each body, that is, for each connected component of a matrix.
 
 use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
@@ -7,19 +7,19 @@ use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// Factorizes each body on its own.
+/// Factorizes each body separately.
 ///
-/// Bodies are the connected components of the matrix. Contact and ties by multipliers couple none of them, so that
-/// bodies in contact stay apart in the effective matrix; bodies that share a dof, a spring or a penalty in K are one.
-/// Each is ordered, factorized and solved alone, with one solver for all or with a solver of its own
-/// ([`body`](Self::body)). Results are those of a single factorization up to rounding.
+/// Bodies are the connected components of the matrix. Contact and ties by multipliers do not couple them, so bodies
+/// in contact stay separate in the effective matrix; bodies that share a dof, a spring or a penalty in K are one.
+/// Each is ordered, factorized and solved separately, with one solver for all or with its own solver
+/// ([`body`](Self::body)). Results equal those of a single factorization up to rounding.
 ///
-/// Dofs that are coupled to no other (prescribed ones, point masses, a whole diagonal matrix) form one diagonal part,
-/// whatever solver was chosen; their entries must be positive. Condensation is offered if every body with dofs of
-/// contact is condensed by its own solver.
+/// Dofs that are coupled to no other (prescribed dofs, point masses, a whole diagonal matrix) form one diagonal part
+/// for any solver; their entries must be positive. Condensation is offered if every body with contact dofs is
+/// condensed by its own solver.
 ///
-/// Symmetry and rounding are judged body by body, relative to the entries of the body: a soft body beside a stiff one
-/// is held to its own scale. Errors name dofs of the whole system.
+/// Symmetry and rounding are checked for each body, relative to its own entries, so a soft body next to a stiff one
+/// is checked at its own scale. Errors name dofs of the whole system.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -51,15 +51,15 @@ impl<T: Real> Default for ByBody<'_, T> {
 }
 
 impl<'a, T: Real> ByBody<'a, T> {
-    /// One solver for all bodies, except those that are given their own.
+    /// One solver for all bodies that are not given their own.
     pub fn new(solver: impl LinearSolver<T> + 'a) -> Self {
         Self { others: Box::new(solver), chosen: Vec::new() }
     }
 
-    /// A solver for each body that has any of these dofs: name one dof of it, or the range of all its dofs, of which
-    /// some may be prescribed.
+    /// Sets the solver of each body that has any of these dofs: give one of its dofs, or the range of all its dofs,
+    /// some of which may be prescribed.
     ///
-    /// The analysis refuses dofs that do not exist ([`Error::MissingDof`]) and bodies that are given two solvers
+    /// The analysis rejects dofs that do not exist ([`Error::MissingDof`]) and bodies with two solvers
     /// ([`Error::Incompatible`]).
     #[must_use]
     pub fn body(mut self, dofs: impl IntoIterator<Item = usize>, solver: impl LinearSolver<T> + 'a) -> Self {
@@ -191,7 +191,7 @@ impl Selection {
         }
     }
 
-    /// The entries selected, copied to `scratch` if they are not contiguous.
+    /// The selected entries, copied to `scratch` if they are not contiguous.
     fn read<'x, T: Real>(&self, x: &'x [T], scratch: &'x mut [T]) -> &'x [T] {
         match self {
             Self::Range(range) => &x[range.clone()],
@@ -223,22 +223,22 @@ impl Selection {
 struct Part<T: Real> {
     dofs: Selection,
     pattern: SymbolicSparseColMat<usize>,
-    /// Where its entries are among those of the whole matrix.
+    /// Places of its entries among the entries of the whole matrix.
     entries: Selection,
-    /// Its entries, if they are not contiguous there.
+    /// Its entries, if they are not contiguous in the whole matrix.
     values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
-    /// Where its dofs of contact are on the interface of the system.
+    /// Places of its contact dofs on the interface of the system.
     interface: Selection,
-    /// A column of its dofs, if they are not contiguous; and its solution, if it has no dofs of contact or is solved
-    /// for on a thread of its own.
+    /// A column of its dofs, if they are not contiguous; and its solution, if it has no contact dofs or is solved on
+    /// a thread of its own.
     column: Vec<T>,
-    /// A column of its dofs of contact.
+    /// A column of its contact dofs.
     on_interface: Vec<T>,
 }
 
 impl<T: Real> Part<T> {
-    /// `places` is scratch, an entry for each dof of the system.
+    /// `places` is scratch, one entry for each dof of the system.
     fn new(
         dofs: Vec<usize>,
         pattern: SymbolicSparseColMatRef<'_, usize>,
@@ -285,7 +285,7 @@ impl<T: Real> Part<T> {
         factor.solve(column).map_err(|error| in_system(error, |dof| dofs.at(dof)))
     }
 
-    /// Condenses a part that contact acts on; the solution on its part of the interface is in `on_interface`. Other
+    /// Condenses a part with contact dofs; the solution on its part of the interface is in `on_interface`. Other
     /// parts are solved.
     fn condense(&mut self, rhs: &[T]) -> Result<()> {
         if !self.touches() {
@@ -330,19 +330,19 @@ fn in_system(error: Error, whole: impl Fn(usize) -> usize) -> Error {
 #[derive(Debug)]
 struct Factors<T: Real> {
     parts: Vec<Part<T>>,
-    /// Dofs, dofs of contact, and the pattern of the whole matrix.
+    /// Number of dofs, number of contact dofs, and fingerprint of the whole pattern.
     size: usize,
     height: usize,
     fingerprint: Fingerprint,
-    /// Columns of a part and of its interface: room for the most that were ever solved for, of the interface at least
-    /// for `COLUMNS`.
+    /// Columns of a part and of its interface: memory for the largest number solved so far, for the interface at
+    /// least for `COLUMNS`.
     columns: Vec<T>,
     on_interface: Vec<T>,
-    /// Whether threads are worthwhile: each part then solves for single columns in memory of its own.
+    /// Whether threads are worthwhile: each part then solves single columns in its own memory.
     apart: bool,
 }
 
-/// Room for that many values; allocates if there is less.
+/// A slice of `size` values; allocates if `scratch` is shorter.
 fn room<T: Real>(scratch: &mut Vec<T>, size: usize) -> &mut [T] {
     if scratch.len() < size {
         scratch.resize(size, T::zero());
@@ -400,7 +400,7 @@ fn solve_apart<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     Ok(())
 }
 
-/// As `solve_apart`; contiguous dofs are solved for in place.
+/// As `solve_apart`, but contiguous dofs are solved in place.
 fn solve_in_turn<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     for part in parts {
         match &part.dofs {
@@ -417,7 +417,7 @@ fn solve_in_turn<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
     Ok(())
 }
 
-/// Parts that contact acts on are condensed: `condensation` has asked them all whether they can. The others are solved.
+/// Parts with contact dofs are condensed; `condensation` has checked that they can be. The others are solved.
 impl<T: Real> Condensation<T> for Factors<T> {
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
         match self.apart {

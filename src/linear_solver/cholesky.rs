@@ -19,19 +19,19 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Sparse Cholesky factorization of symmetric positive definite matrices, the dofs of contact eliminated last, the
+/// Sparse Cholesky factorization of symmetric positive definite matrices. The contact dofs are eliminated last, the
 /// others in an order with little fill ([`Ordering`]).
 ///
-/// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix that
-/// is not positive definite is refused with the dof of the failing pivot, one that is not symmetric with its worst
-/// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several times;
-/// see `docs/design.md`.
+/// faer chooses between a simplicial factor (long thin structures) and a supernodal one (plates, solids). A matrix
+/// that is not positive definite is rejected with the dof of the failing pivot, an unsymmetric one with its worst
+/// entry. In `f32` fill entries far from the diagonal may become subnormal and slow a factorization down several
+/// times; see `docs/design.md`.
 ///
-/// With the feature `rayon` large factors are computed and swept by the threads of the pool of the caller. Results are
-/// the same bit for bit with any number of threads.
+/// With the feature `rayon` the threads of the caller's pool compute and sweep large factors. Results are bitwise the
+/// same for any number of threads.
 ///
-/// [`analyze`](LinearSolver::analyze) refuses, besides what the trait says, an order that does not fit the pattern:
-/// [`Error::Dimension`], [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
+/// [`analyze`](LinearSolver::analyze) also rejects an order that does not fit the pattern: [`Error::Dimension`],
+/// [`Error::MissingDof`], [`Error::RepeatedDof`], [`Error::NotFinite`].
 #[derive(Clone, Debug, Default)]
 pub struct Cholesky {
     ordering: Ordering,
@@ -39,7 +39,7 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// With an order of the caller's choice; `default()` is [`Ordering::Automatic`].
+    /// With the given ordering; `default()` is [`Ordering::Automatic`].
     ///
     /// ```
     /// use contact_dynamics::Cholesky;
@@ -55,10 +55,9 @@ impl Cholesky {
         Self { ordering, shared: None }
     }
 
-    /// Shares analyses among all clones of this value: a run whose matrix has the pattern of an earlier one takes its
-    /// order of elimination, and the memory that holds it. For studies of many runs, side by side or one after the
-    /// other; the factors are those without sharing, bit for bit. The last sixteen analyses are kept as long as a clone
-    /// is.
+    /// Shares analyses among all clones of this value: a run whose matrix has the pattern of an earlier one reuses
+    /// its elimination order and the memory for it. For studies of many runs, in parallel or in sequence; the factors
+    /// are bitwise the same as without sharing. The last sixteen analyses are kept as long as a clone exists.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -97,8 +96,8 @@ impl Cholesky {
         }
     }
 
-    /// Number of scalars that the factor of a pattern (both triangles) will hold with `last` (ascending) eliminated
-    /// last, without allocating it: what [`Factorization::stored_values`] will say.
+    /// Number of scalars in the factor of a pattern (both triangles) with `last` (ascending) eliminated last, without
+    /// allocating the factor; equals the later [`Factorization::stored_values`].
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -117,15 +116,16 @@ impl Cholesky {
     ///
     /// # Errors
     ///
-    /// Those of [`analyze`](LinearSolver::analyze); [`Error::OutOfMemory`] only if the analysis itself finds no memory.
+    /// The errors of [`analyze`](LinearSolver::analyze); [`Error::OutOfMemory`] only if the analysis itself runs out
+    /// of memory.
     pub fn estimate(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<usize> {
         check_analysis(pattern, last)?;
         Ok(self.symbolic(pattern, last)?.len_val())
     }
 
-    /// The order in which the dofs of a pattern are eliminated, `last` (ascending) behind the others: the first entry
-    /// names the dof eliminated first. To keep with a model: by [`Ordering::Given`] a later run finds it without a
-    /// search, and its factor is the same.
+    /// The elimination order of the dofs of a pattern, with `last` (ascending) after the others: the first entry is
+    /// the dof eliminated first. It can be stored with a model: with [`Ordering::Given`] a later run skips the search
+    /// and gets the same factor.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -146,7 +146,7 @@ impl Cholesky {
     ///
     /// # Errors
     ///
-    /// Those of [`estimate`](Self::estimate).
+    /// The errors of [`estimate`](Self::estimate).
     pub fn order(&self, pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<Vec<usize>> {
         check_analysis(pattern, last)?;
         let symbolic = self.symbolic(pattern, last)?;
@@ -160,7 +160,7 @@ struct Factor<T: Real> {
     kind: Kind,
     values: Vec<T>,
     memory: Option<MemBuffer>,
-    /// How a supernodal factor is computed, and what threads need for it.
+    /// How a supernodal factor is computed, and the workspaces of threads for it.
     elimination: Option<Elimination>,
     workspaces: Option<PerThread<Workspace<T>>>,
     /// Memory of solves for several right-hand sides.
@@ -172,11 +172,12 @@ struct Factor<T: Real> {
     work: Vec<T>,
     /// One right-hand side in the order of elimination; its entries in the forest are in `work`.
     sweep: Vec<T>,
-    /// For each dof of the interface, its place among those eliminated last.
+    /// The place of each interface dof among those eliminated last.
     interface: Vec<usize>,
-    /// Columns on the interface in the order of elimination; room for `COLUMNS`, or the most that were ever solved for.
+    /// Columns on the interface in the order of elimination; capacity for `COLUMNS`, or the largest number solved so
+    /// far.
     trailing: Vec<T>,
-    /// Room for the rows below any supernode, for as many columns.
+    /// Memory for the rows below any supernode, for as many columns.
     below: Vec<T>,
     /// Memory of the check of symmetry.
     cursor: Vec<usize>,
@@ -224,7 +225,7 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         let (pivots, sweep) = (vec![T::zero(); n], vec![T::zero(); n]);
         let what = "the interface of a sparse Cholesky factor";
         let trailing = memory::zeros(COLUMNS, last.len(), what)?;
-        // Without an interface there are still the sweeps over one right-hand side.
+        // Without an interface, sweeps over one right-hand side still need memory.
         let below = memory::zeros(if last.is_empty() { 1 } else { COLUMNS }, below, what)?;
         Ok(Box::new(Factor {
             fingerprint: Fingerprint::of(pattern),
@@ -253,13 +254,13 @@ fn buffer(size: StackReq) -> Result<MemBuffer> {
     MemBuffer::try_new(size).map_err(|_| Error::OutOfMemory { what: "sparse Cholesky scratch", bytes })
 }
 
-/// What the threads of the current pool need for a factorization.
+/// Workspaces of the threads of the current pool for a factorization.
 fn workspaces<T: Real>(dofs: usize) -> Result<PerThread<Workspace<T>>> {
     PerThread::new(|| T::supernodal_workspace(dofs))
         .ok_or(Error::OutOfMemory { what: "sparse Cholesky scratch", bytes: None })
 }
 
-/// The largest number of rows that a sweep over part of a supernode's columns has below it.
+/// The largest number of rows of a supernode, which bounds the rows below any part of its columns.
 fn tallest(raw: &faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky<usize>) -> usize {
     let height = |s: usize| {
         let columns = raw.supernode_end()[s] - raw.supernode_begin()[s];
@@ -273,12 +274,12 @@ impl<T: Real> Factor<T> {
         self.symbolic.nrows()
     }
 
-    /// Columns of the interface in the order of elimination; those of the interior are before them.
+    /// Columns of the interface in the order of elimination; those of the interior precede them.
     fn trailing(&self) -> Range<usize> {
         self.size() - self.interface.len()..self.size()
     }
 
-    /// Takes a right-hand side, and sweeps forward over the columns before `end`.
+    /// Reads a right-hand side, and sweeps forward over the columns before `end`.
     fn forward(&mut self, rhs: &[T], end: usize) {
         let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
         let order = symbolic.perm().map(|perm| perm.arrays().0);
@@ -302,7 +303,7 @@ impl<T: Real> Factor<T> {
         sweep(Sweep::Forward, (symbolic, values), behind..end, x, behind, below);
     }
 
-    /// Sweeps backward over the columns before `end`; the columns behind are already solved for.
+    /// Sweeps backward over the columns before `end`; later columns are already solved.
     fn backward(&mut self, end: usize) {
         let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
         let behind = forest.as_ref().map_or(0, |forest| forest.end);
@@ -325,7 +326,7 @@ impl<T: Real> Factor<T> {
         self.give(column);
     }
 
-    /// Solves for some columns side by side with a supernodal factor.
+    /// Solves for several columns together with a supernodal factor.
     fn solve_together(&mut self, columns: &mut [T]) -> Result<()> {
         let Self { symbolic, values, together, .. } = self;
         let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return Ok(()) };
@@ -336,7 +337,7 @@ impl<T: Real> Factor<T> {
         Ok(())
     }
 
-    /// Brings the solution into the order of the matrix.
+    /// Writes the solution in the order of the matrix.
     fn give(&self, solution: &mut [T]) {
         let Self { symbolic, forest, work, sweep: x, .. } = self;
         let order = symbolic.perm().map(|perm| perm.arrays().0);
@@ -355,7 +356,8 @@ impl<T: Real> Factor<T> {
     }
 }
 
-/// A sweep over some columns of the factor, forward (with the division by D of a simplicial one) or backward.
+/// Direction of a sweep over columns of the factor; the forward sweep of a simplicial factor includes the division by
+/// D.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sweep {
     Forward,
@@ -419,7 +421,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
             };
         factorized.map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         let sound = |(dof, &pivot): (usize, &T)| pivot > negligible * sparse::entry(a, dof, dof);
         match pivots.iter().enumerate().position(|pivot| !sound(pivot)) {
             Some(dof) => Err(singular(dof)),

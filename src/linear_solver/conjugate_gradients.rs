@@ -9,21 +9,20 @@ use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// The preconditioner of [`ConjugateGradients`]. All work on blocks of the two or three dofs of a node, where the
-/// pattern of the matrix shows such.
+/// The preconditioner of [`ConjugateGradients`]. All act on blocks of the two or three dofs of a node, if the pattern
+/// of the matrix has such blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preconditioner {
-    /// The diagonal blocks. For comparison: the other two need fewer iterations.
+    /// The diagonal blocks. For comparison only: the other two need fewer iterations.
     Nodes,
-    /// A forward and a backward sweep of Gauss–Seidel, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci.
-    /// Stat. Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no memory of its
-    /// own.
+    /// A forward and a backward Gauss–Seidel sweep, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci.
+    /// Stat. Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no extra memory.
     #[default]
     GaussSeidel,
     /// Incomplete Cholesky factorization without fill (Meijerink and van der Vorst, Math. Comput. 31, 1977), with a
-    /// growing shift of the diagonal where it breaks down (Manteuffel, Math. Comput. 34, 1980). Fewer iterations, of
-    /// twice the cost, and as much memory again as the matrix.
+    /// growing shift of the diagonal if it breaks down (Manteuffel, Math. Comput. 34, 1980). Fewer iterations at
+    /// twice the cost each, and as much extra memory as the matrix.
     IncompleteCholesky,
 }
 
@@ -31,20 +30,20 @@ pub enum Preconditioner {
 /// positive definite matrices: an iteration instead of a factor, for large solid bodies at small steps.
 ///
 /// At small steps inertia dominates the effective matrix w_ā/h² M + K: its condition number is about 1 + Co² with the
-/// Courant number Co of the step, whatever the size of the body, and few iterations do. `docs/performance.md` has the
-/// Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky). Memory
-/// is that of half the matrix, where factors of solids hold ten to a hundred times as much.
+/// Courant number Co of the step, for any size of the body, and few iterations suffice. `docs/performance.md` gives
+/// the Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky).
+/// They need the memory of half the matrix; factors of solids need ten to a hundred times as much.
 ///
-/// Every solve starts from zero and uses nothing of earlier ones. Steps solve for the increment from the predicted
-/// motion, so that zero is the prediction itself, and a run that is resumed from a clone goes on bit for bit.
+/// Every solve starts from zero and uses no data of earlier ones. Steps solve for the increment from the predicted
+/// motion, so zero is the prediction itself, and a run resumed from a clone is bitwise the same.
 ///
-/// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), over that of the right-hand side, which
-/// does not depend on the units of the dofs: nearly the error in the energy norm of A. An iteration ends at the
-/// [`tolerance`](Self::tolerance), or where steps become too small for the scalar to resolve (as they always do in
-/// `f32` with the default tolerance).
+/// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), relative to the right-hand side. This
+/// does not depend on the units of the dofs and is close to the error in the energy norm of A. An iteration ends at
+/// the [`tolerance`](Self::tolerance), or when updates become too small for the scalar to resolve, as they always do
+/// in `f32` with the default tolerance.
 ///
-/// Offers no [`condensation`](Factorization::condensation): contact takes a full solve for each row that presses (kept
-/// while rows and matrix do not change) and one more a step. For hundreds of contacts that move, take a factorization.
+/// It offers no [`condensation`](Factorization::condensation): contact needs a full solve for each pressed row (kept
+/// while rows and matrix are unchanged) and one more per step. For hundreds of moving contacts use a factorization.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -69,10 +68,11 @@ pub enum Preconditioner {
 ///
 /// # Errors
 ///
-/// A factorization refuses what [`Cholesky`](super::Cholesky) refuses of entries and symmetry, and diagonal blocks that
-/// are not positive definite: [`Error::Singular`]. A solve fails with [`Error::LinearNotConverged`], and with
-/// [`Error::Indefinite`] where a direction shows that A is not positive definite: an indefinite matrix is detected only
-/// by some right-hand sides. [`Error::Dimension`] for right-hand sides of another size.
+/// A factorization fails as [`Cholesky`](super::Cholesky) does for wrong entries and asymmetry, and with
+/// [`Error::Singular`] for diagonal blocks that are not positive definite. A solve fails with
+/// [`Error::LinearNotConverged`], and with [`Error::Indefinite`] if it finds a direction in which A is not positive
+/// definite: only some right-hand sides detect an indefinite matrix. [`Error::Dimension`] for right-hand sides of
+/// another size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConjugateGradients {
     tolerance: f64,
@@ -88,17 +88,17 @@ impl Default for ConjugateGradients {
 }
 
 impl ConjugateGradients {
-    /// The residual at which a solve ends, over the right-hand side, both in the norm of the preconditioner; 1e-10 by
-    /// default.
+    /// The residual at which a solve ends, relative to the right-hand side, both in the norm of the preconditioner;
+    /// 1e-10 by default.
     ///
-    /// With the default, energy, momentum and displacements of a run with impacts differ from those by
-    /// [`Cholesky`](super::Cholesky) by about a fifth of the tolerance (`cargo bench --bench iterative`): below the
-    /// error of any step in practice. Each further digit takes about one more iteration. Errors do not grow as steps
-    /// become smaller: each solve is for the increment of its step.
+    /// With the default, energy, momentum and displacements of a run with impacts differ from a run with
+    /// [`Cholesky`](super::Cholesky) by about a fifth of the tolerance (`cargo bench --bench iterative`), less than
+    /// the error of any practical step. Each further digit takes about one more iteration. Errors do not grow with
+    /// smaller steps, because each solve is for the increment of its step.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] unless 0 ≤ tolerance < 1. With zero a solve goes on to rounding.
+    /// [`Error::Parameter`] unless 0 ≤ tolerance < 1. With zero a solve continues to rounding.
     pub fn tolerance(self, tolerance: f64) -> Result<Self> {
         if (0.0..1.0).contains(&tolerance) {
             return Ok(Self { tolerance, ..self });
@@ -107,7 +107,7 @@ impl ConjugateGradients {
         Err(Error::Parameter { name, value: tolerance, range: "at least zero and less than one" })
     }
 
-    /// The largest number of iterations of a solve, 1000 by default; at least one is made.
+    /// The iteration limit of a solve, 1000 by default; at least one iteration is made.
     #[must_use]
     pub fn iterations(self, iterations: usize) -> Self {
         Self { iterations, ..self }
@@ -120,7 +120,7 @@ impl ConjugateGradients {
     }
 }
 
-/// A matrix in blocks, scaled, and memory for the iteration.
+/// A scaled matrix in blocks, and memory for the iteration.
 struct Matrix<T: Real> {
     settings: ConjugateGradients,
     dofs: usize,
@@ -133,7 +133,7 @@ struct Matrix<T: Real> {
     values: Vec<T>,
     /// C⁻¹ of the diagonal blocks C Cᵀ.
     scaling: Vec<T>,
-    /// The incomplete factor, if there is one: blocks below the diagonal, and the inverses of those on it.
+    /// The incomplete factor, if there is one: blocks below the diagonal, and the inverses of the diagonal blocks.
     factor: Vec<T>,
     inverses: Vec<T>,
     /// Five vectors.
@@ -200,8 +200,8 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
         last: &[usize],
     ) -> Result<Box<dyn Factorization<T>>> {
         let dofs = check_analysis(pattern, last)?;
-        // The size that needs the least memory: larger blocks store zeros, smaller ones more indices of half a number
-        // each.
+        // The block size that needs the least memory: larger blocks store zeros, smaller ones more indices, each half
+        // the size of a scalar.
         let mut best: Option<(usize, Vec<usize>, Vec<u32>)> = None;
         for size in [3, 2, 1].into_iter().filter(|size| dofs.is_multiple_of(*size)) {
             let (pointers, columns) = blocks(pattern, size)?;
@@ -241,7 +241,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
 }
 
 impl<T: Real> Matrix<T> {
-    /// Takes the entries of a symmetric matrix.
+    /// Copies the entries of a symmetric matrix.
     fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         let Self { size, pointers, columns, values, scaling, .. } = self;
         let size = *size;
@@ -278,8 +278,8 @@ impl<T: Real> Matrix<T> {
     fn incomplete(&mut self) -> Result<()> {
         let Self { size, pointers, columns, values, factor, inverses, .. } = self;
         let lower = Blocks { pointers, columns, values };
-        // The shift is doubled from a thousandth of the diagonal: for any matrix with a unit diagonal the factor exists
-        // once it is large enough.
+        // The shift starts at a thousandth of the diagonal and is doubled: for any matrix with a unit diagonal the
+        // factor exists for a sufficiently large shift.
         let shifts = std::iter::successors(Some(1e-3), |shift| Some(2.0 * shift)).take_while(|shift| *shift < 1e6);
         for shift in std::iter::once(0.0).chain(shifts) {
             if T::incomplete_cholesky(*size, &lower, T::of(shift), factor, inverses) {

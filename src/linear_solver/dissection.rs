@@ -1,5 +1,5 @@
-//! Nested dissection: what separates two parts of a structure is eliminated after both, each of which is ordered in the
-//! same way (George, SIAM J. Numer. Anal. 10, 1973).
+//! Nested dissection: the vertices that separate two parts of a structure are eliminated after both parts, each of
+//! which is ordered in the same way (George, SIAM J. Numer. Anal. 10, 1973).
 
 mod coordinates;
 mod leaf;
@@ -17,10 +17,10 @@ use separator::{BETWEEN, Separator};
 /// Parts of at most this many vertices are ordered by minimum degree.
 const LEAF: usize = 64;
 
-/// The smallest part, in vertices, that is worth a thread of its own.
+/// The smallest part, in vertices, that gets a thread of its own.
 const GRAIN: usize = 2000;
 
-/// The order of all vertices that are not eliminated last, by separators of the graph.
+/// The order of all vertices not eliminated last, by separators of the graph.
 pub(super) fn by_graph(quotient: &Quotient) -> Result<Vec<u32>> {
     dissect(quotient, true, |part, _| multilevel::bisect(part))
 }
@@ -31,7 +31,8 @@ pub(super) fn by_coordinates(quotient: &Quotient, places: &[[f64; 3]]) -> Result
     dissect(quotient, false, |part, names| coordinates::bisect(part, &names.iter().map(place).collect::<Vec<_>>()))
 }
 
-/// The part of each dof, of so many parts alike in size (one at least); dofs with the same neighbors are together.
+/// The part of each dof, with `count` parts of similar size (at least one); dofs with the same neighbors stay
+/// together.
 pub(super) fn parts(quotient: &Quotient, count: usize) -> Result<Vec<usize>> {
     let graph = &quotient.graph;
     let of_vertices = parts::parts(graph, count)?;
@@ -42,8 +43,8 @@ pub(super) fn parts(quotient: &Quotient, count: usize) -> Result<Vec<usize>> {
     Ok(parts)
 }
 
-/// `bisect` gets connected parts of the graph with the names of their vertices; `weigh` says whether it reads weights
-/// of edges.
+/// `bisect` receives connected parts of the graph with the names of their vertices; `weigh` is whether it reads edge
+/// weights.
 fn dissect(quotient: &Quotient, weigh: bool, bisect: impl Fn(&Graph, &[u32]) -> Separator + Sync) -> Result<Vec<u32>> {
     let whole = &quotient.graph;
     let mut local = vec![NONE; whole.size()];
@@ -60,22 +61,22 @@ fn dissect(quotient: &Quotient, weigh: bool, bisect: impl Fn(&Graph, &[u32]) -> 
     Ok(order)
 }
 
-/// Vertices of a graph, and those of them with so many neighbors that every separator would contain them: they are
-/// eliminated last.
+/// Splits vertices into sparse and dense ones. Dense ones have so many neighbors that every separator would contain
+/// them; they are eliminated last.
 fn without_dense(graph: &Graph, vertices: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     let many = 10.0 * (vertices.len() as f64).sqrt().max(1.6);
     vertices.into_iter().partition(|&vertex| graph.neighbors(vertex).len() as f64 <= many)
 }
 
-/// A graph, and how connected parts of it are cut.
+/// A graph, and the function that bisects connected parts of it.
 struct Dissection<'g, F> {
     whole: &'g Graph,
     bisect: F,
 }
 
 impl<F: Fn(&Graph, &[u32]) -> Separator + Sync> Dissection<'_, F> {
-    /// Orders pieces of a part, between which there is no edge, one after the other; `names` are those of the part's
-    /// vertices, `local` is scratch as for [`Graph::part`].
+    /// Orders unconnected pieces of a part one after the other; `names` are the names of the part's vertices, `local`
+    /// is scratch as for [`Graph::part`].
     fn pieces(
         &self,
         part: &Graph,
@@ -120,7 +121,7 @@ impl<F: Fn(&Graph, &[u32]) -> Separator + Sync> Dissection<'_, F> {
         let separator = (self.bisect)(&part, &names);
         let [one, other, _] = separator.weights;
         if one.min(other) * 8 < one + other {
-            // So unequal that separators gain nothing.
+            // Too unequal for separators to help.
             put(order, &minimum_degree(part.pattern())?);
             return Ok(());
         }

@@ -1,15 +1,15 @@
-//! The elimination tree of a graph in an order of its vertices, and the fill of that order.
+//! The elimination tree of a graph for an order of its vertices, and the fill of that order.
 
 use super::graph::{Graph, NONE, number};
 
-/// For each vertex, the first one of those that its elimination joins (Liu, SIAM J. Matrix Anal. Appl. 11, 1990).
+/// For each vertex, the first vertex coupled to it by its elimination (Liu, SIAM J. Matrix Anal. Appl. 11, 1990).
 #[derive(Debug)]
 pub(super) struct EliminationTree {
-    /// For each place in the order that of the parent; [`NONE`] at roots.
+    /// For each place in the order the place of its parent; [`NONE`] at roots.
     parents: Vec<u32>,
-    /// For each place the number of dofs below those of its vertex in the factor.
+    /// For each place the number of dofs below the dofs of its vertex in the factor.
     below: Vec<u32>,
-    /// Entries of the factor of the dofs that the vertices stand for.
+    /// Entries of the factor, counted in the dofs of the vertices.
     pub(super) fill: u64,
 }
 
@@ -25,7 +25,7 @@ impl EliminationTree {
         for (&vertex, k) in order.iter().zip(0_u32..) {
             let weight = graph.weight(vertex);
             reached[k as usize] = k;
-            // A row of the factor: from each earlier neighbor up the tree, as far as nobody has been.
+            // A row of the factor: from each earlier neighbor up the tree, up to the first vertex already reached.
             for &neighbor in graph.neighbors(vertex) {
                 let mut i = place[neighbor as usize] as usize;
                 while i < k as usize && reached[i] != k {
@@ -45,10 +45,11 @@ impl EliminationTree {
         Self { parents, below, fill }
     }
 
-    /// An order with the same fill in which every branch of the tree has consecutive places, and the tallest of several
-    /// children the last ones, where it can become one supernode with its parent. Places from `interior` on stay.
+    /// An order with the same fill in which every branch of the tree has consecutive places. The tallest of several
+    /// children has the last ones, so that it can form one supernode with its parent. Places from `interior` on are
+    /// unchanged.
     pub(super) fn postordered(&self, order: &[u32], interior: usize) -> Vec<u32> {
-        // The children of each place as a list, the tallest first; roots are those of one place more.
+        // The children of each place as a list, the tallest first; roots are children of one extra place.
         let mut children: Vec<u32> = (0..number(interior)).collect();
         children.sort_by_key(|&child| self.below[child as usize]);
         let (mut head, mut next) = (vec![NONE; interior + 1], vec![NONE; interior]);
@@ -56,7 +57,7 @@ impl EliminationTree {
             let parent = (self.parents[child as usize] as usize).min(interior);
             next[child as usize] = std::mem::replace(&mut head[parent], child);
         }
-        // Backward: a place, then its children, each with all of its branch.
+        // Backward: a place, then its children, each with its whole branch.
         let mut places = Vec::with_capacity(interior);
         let mut open = vec![head[interior]];
         while let Some(place) = open.pop() {
@@ -77,7 +78,7 @@ mod tests {
     use crate::linear_solver::quotient::patterns::{chain, cube, frame, pattern, strewn};
     use std::collections::BTreeSet;
 
-    /// Entries of the factor, by elimination of one vertex after the other.
+    /// Entries of the factor, by eliminating vertices one by one.
     fn eliminated(graph: &Graph, order: &[u32]) -> u64 {
         let mut near: Vec<BTreeSet<u32>> =
             (0..number(graph.size())).map(|vertex| graph.neighbors(vertex).iter().copied().collect()).collect();
@@ -102,7 +103,7 @@ mod tests {
                 let quotient = Quotient::new(pattern(n, &pairs).as_ref(), &last).unwrap().unwrap();
                 let graph = &quotient.graph;
                 let size = number(graph.size());
-                // Interior vertices strewn, the others behind them.
+                // Interior vertices scattered, the others after them.
                 let strewn = (0..size).map(|k| (k * 7919) % size);
                 let (interior, last): (Vec<_>, Vec<_>) = strewn.partition(|&vertex| !quotient.is_last(vertex));
                 let order = [&interior[..], &last].concat();
@@ -115,7 +116,7 @@ mod tests {
                 let mut names = postordered.clone();
                 names.sort_unstable();
                 assert!(names.into_iter().eq(0..size));
-                // Each branch has as many vertices as there are places from its first one on.
+                // The number of vertices of each branch equals the number of its places.
                 let tree = EliminationTree::new(graph, &postordered);
                 let interior = interior.len();
                 let (mut first, mut count): (Vec<_>, Vec<_>) = (0..interior).map(|place| (place, 1)).unzip();

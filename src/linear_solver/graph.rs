@@ -4,10 +4,10 @@ use crate::error::Result;
 use crate::memory;
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// No vertex: a graph has fewer.
+/// No vertex: the numbers of vertices are smaller.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The number of a vertex, or of an edge. (Whoever makes a graph checks that it is not too large.)
+/// The number of a vertex or edge. Callers check that graphs are not too large.
 pub(super) fn number(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
@@ -17,14 +17,14 @@ pub(super) fn number(index: usize) -> u32 {
 pub(super) struct Graph {
     starts: Vec<u32>,
     neighbors: Vec<u32>,
-    /// For each neighbor the weight of the edge to it.
+    /// The weight of the edge to each neighbor.
     edges: Vec<u32>,
-    /// For each vertex, the number of dofs it stands for.
+    /// The number of dofs of each vertex.
     weights: Vec<u32>,
 }
 
 impl Graph {
-    /// A graph without vertices, with room for some.
+    /// A graph without vertices, with reserved memory.
     pub(super) fn with_capacity(vertices: usize, entries: usize) -> Result<Self> {
         let room = |entries: usize| memory::reserve(entries, 1, "the graph of a matrix, whose order is sought");
         let mut starts = room(vertices + 1)?;
@@ -32,7 +32,7 @@ impl Graph {
         Ok(Self { starts, neighbors: room(entries)?, edges: room(entries)?, weights: room(vertices)? })
     }
 
-    /// One that is smaller than another which is there; it gets its memory as it grows.
+    /// An empty graph for one smaller than an existing graph; its memory grows as needed.
     pub(super) fn smaller() -> Self {
         Self { starts: vec![0], neighbors: Vec::new(), edges: Vec::new(), weights: Vec::new() }
     }
@@ -45,7 +45,7 @@ impl Graph {
         number(self.neighbors.len() - 1)
     }
 
-    /// Makes the edge at a place heavier.
+    /// Increases the weight of the edge at a place.
     #[inline]
     pub(super) fn thicken(&mut self, place: u32, edges: u32) {
         let edge = &mut self.edges[place as usize];
@@ -58,8 +58,8 @@ impl Graph {
         self.weights.push(weight);
     }
 
-    /// Makes every edge as heavy as the number of neighbors that its ends have in common: pairs along heavy edges are
-    /// compact. Graphs so dense that this would take long are left as they are.
+    /// Sets the weight of each edge to the number of common neighbors of its ends: pairs along heavy edges are
+    /// compact. Very dense graphs, for which this would take long, are left unchanged.
     pub(super) fn weigh_edges(&mut self) {
         let work: usize = (0..self.size()).map(|vertex| self.neighbors(number(vertex)).len().pow(2)).sum();
         if work > 100 * self.entries() {
@@ -116,7 +116,8 @@ impl Graph {
         SymbolicSparseColMatRef::new_unsorted_checked(self.size(), self.size(), &self.starts, None, &self.neighbors)
     }
 
-    /// The graph of some of the vertices; `local` has room for all of them, with [`NONE`] everywhere, and is left so.
+    /// The graph of some of the vertices; `local` has an entry for each vertex of this graph, [`NONE`] on entry and
+    /// on return.
     pub(super) fn part(&self, vertices: &[u32], local: &mut [u32]) -> Result<Self> {
         let entries = vertices.iter().map(|&vertex| self.neighbors(vertex).len()).sum();
         let mut part = Self::with_capacity(vertices.len(), entries)?;

@@ -11,26 +11,27 @@ use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu, factoriz
 use faer::sparse::linalg::{LuError, qr};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 
-/// Sparse LU factorization with partial pivoting, for any regular matrix: tangents that are not symmetric (loads that
-/// follow the motion, gyroscopic and circulatory matrices), and indefinite ones.
+/// Sparse LU factorization with partial pivoting, for any regular matrix: unsymmetric tangents (follower loads,
+/// gyroscopic and circulatory matrices) and indefinite ones.
 ///
-/// Columns are eliminated in an order with little fill for every choice of pivots (COLAMD), rows as the pivots demand.
+/// Columns are eliminated in an order with little fill for any choice of pivots (COLAMD), rows as pivoting requires.
 /// Rows and columns are first scaled by powers of two, to largest entries of about one: pivots do not depend on the
-/// units of translations and rotations, or on a stiff body beside a soft one.
+/// units of translations and rotations, or on a stiff body next to a soft one.
 ///
-/// **Singular matrices** are refused as [`Error::Singular`]: one whose condition number, after scaling, is beyond 1/(16
-/// ε) (Hager's estimate of the 1-norm). The solution for a generic right-hand side reveals it: one solve a
-/// factorization, and two more only where that solution is large. The dof named is the one that moves most in the null
+/// **Singular matrices** are rejected as [`Error::Singular`]: those with a condition number, after scaling, beyond
+/// 1/(16 ε) (Hager's estimate of the 1-norm). The solution for a generic right-hand side reveals it: one solve per
+/// factorization, and two more only if that solution is large. The named dof has the largest entry of the null
 /// vector.
 ///
 /// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
-/// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact takes a full
-/// solve for each contact that presses, and one more. [`stored_values`](Factorization::stored_values) is a bound that
-/// holds for every choice of pivots; the factor may hold much less. Factorizing again does not allocate for long thin
-/// structures, where faer works column by column; for plates and solids it works in blocks and allocates some for each.
+/// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact needs a
+/// full solve for each pressed contact, and one more. [`stored_values`](Factorization::stored_values) is an upper
+/// bound for any choice of pivots; the factor may be much smaller. Refactorization does not allocate for long thin
+/// structures, which faer processes column by column; for plates and solids it works in blocks and allocates some
+/// memory each time.
 ///
-/// An **indefinite** matrix is factorized without an error. [`Cholesky`](super::Cholesky) refuses it, from which
-/// Newton's method learns that a step is too long for a negative stiffness; with this solver it does not.
+/// An **indefinite** matrix is factorized without an error. [`Cholesky`](super::Cholesky) rejects it, which tells
+/// Newton's method that a step is too long for a negative stiffness; with this solver that information is missing.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -64,18 +65,18 @@ struct Factor<T: Real> {
     symbolic: SymbolicLu<usize>,
     numeric: NumericLu<usize, T>,
     state: State,
-    /// The pattern analyzed, and the scaled values R A C in it.
+    /// The analyzed pattern, and the scaled values R A C in it.
     pattern: SymbolicSparseColMat<usize>,
     scaled: Vec<T>,
     /// Diagonals of R and C.
     rows: Vec<T>,
     columns: Vec<T>,
     memory: MemBuffer,
-    /// Right-hand sides that `memory` has room for.
+    /// Number of right-hand sides for which `memory` suffices.
     room: usize,
-    /// Largest number of scalars that L and U can have.
+    /// Upper bound of the number of scalars in L and U.
     bound: usize,
-    /// Vectors of the estimate of the condition.
+    /// Vectors for estimating the condition number.
     probe: Vec<T>,
 }
 
@@ -122,8 +123,9 @@ impl<T: Real> LinearSolver<T> for Lu {
     }
 }
 
-/// The largest number of entries of L and U with this order of columns, whatever the pivots: U fits into the triangular
-/// factor of AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8, 1987).
+/// Upper bound of the number of entries of L and U for this order of columns and any pivots: U fits into the
+/// triangular factor of AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8,
+/// 1987).
 fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usize>) -> Result<usize> {
     let n = pattern.ncols();
     let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU", bytes: None };
@@ -138,7 +140,7 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
     let tree = qr::col_etree(pattern, order, &mut parents, stack);
     qr::postorder(&mut post, tree, stack);
     qr::column_counts_ata(&mut counts, &mut first, transposed.as_ref(), order, tree, &post, stack);
-    // Row i joins at its first column; from each column all rows but one, the pivot row, pass on to the parent.
+    // Row i joins at its first column; each column passes all rows except the pivot row on to the parent.
     let mut heights = vec![0_usize; n];
     for &column in first.iter().filter(|&&column| column < n) {
         heights[column] += 1;
@@ -151,7 +153,7 @@ fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usiz
     Ok(heights.iter().sum::<usize>() + counts.iter().sum::<usize>())
 }
 
-/// The most passes that scale the matrix; each halves the logarithms of rows and columns out of scale.
+/// Largest number of scaling passes; each halves the logarithms of the row and column scales.
 const PASSES: usize = 6;
 
 /// The exponent of the largest power of two that is not above a positive x.
@@ -165,7 +167,7 @@ fn reciprocal_root<T: Real>(x: T) -> T {
     T::of(2.0).powi(-(binary_exponent(x) / 2))
 }
 
-/// A pseudo-random number between −1 and 1, at least ½ in size.
+/// A pseudo-random number between −1 and 1, of magnitude at least ½.
 fn scatter<T: Real>(index: usize) -> T {
     let mixed = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -177,14 +179,14 @@ fn sum_of_sizes<T: Real>(x: &[T]) -> T {
     x.iter().map(|x| x.abs()).sum()
 }
 
-/// Index of the entry of largest size; the first that is not finite, if there is one.
+/// Index of the entry of largest magnitude; of the first that is not finite, if there is one.
 fn largest<T: Real>(x: &[T]) -> usize {
     let larger = |best: usize, i: usize| if x[i].abs() > x[best].abs() { i } else { best };
     x.iter().position(|x| !x.is_finite()).unwrap_or_else(|| (0..x.len()).fold(0, larger))
 }
 
 impl<T: Real> Factor<T> {
-    /// Refuses another pattern than the one analyzed, and NaN and infinity.
+    /// Rejects another pattern than the analyzed one, and NaN and infinity.
     fn check(&self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         let pattern = self.pattern.as_ref();
         let n = sparse::square("effective matrix", a)?;
@@ -207,12 +209,11 @@ impl<T: Real> Factor<T> {
 
     /// Forms R A C; `Err` names a dof without entries.
     ///
-    /// Rows and columns are brought together by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which finds
-    /// units that belong to dofs.
+    /// Rows and columns are equilibrated by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which
+    /// compensates different units of dofs.
     fn scale(&mut self, a: SparseColMatRef<'_, usize, T>) -> std::result::Result<(), usize> {
-        // Largest entries of about one first: what follows does not see the unit of the matrix.
-        // (The reciprocal of a subnormal number may be none.)
-        // A matrix without entries is that of dof 0 too.
+        // Scale the largest entries to about one first, so that the rest does not depend on the unit of the matrix.
+        // The reciprocal of a subnormal number may overflow. A matrix without entries names dof 0.
         let size = a.val().get(largest(a.val())).ok_or(0_usize)?.abs().max(T::min_positive_value());
         let (unit, root) = (T::of(2.0).powi(-binary_exponent(size)), reciprocal_root(size));
         T::scale_into(unit, a.val(), &mut self.scaled);
@@ -226,7 +227,7 @@ impl<T: Real> Factor<T> {
         Ok(())
     }
 
-    /// One pass over the matrix; says whether there was nothing to do.
+    /// One pass over the matrix; returns whether it was already balanced.
     fn balance(&mut self) -> std::result::Result<bool, usize> {
         let Self { pattern, scaled, rows, columns, probe: factors, .. } = self;
         factors.fill(T::zero());
@@ -259,7 +260,7 @@ impl<T: Real> Factor<T> {
         Ok(balanced)
     }
 
-    /// Factorizes the scaled values; `Err(Ok(dof))` where no pivot is left.
+    /// Factorizes the scaled values; `Err(Ok(dof))` if no pivot is left.
     fn eliminate(&mut self) -> std::result::Result<(), std::result::Result<usize, Error>> {
         let Self { symbolic, numeric, pattern, scaled, memory, .. } = self;
         let a = SparseColMatRef::new(pattern.as_ref(), &scaled[..]);
@@ -278,8 +279,8 @@ impl<T: Real> Factor<T> {
         T::lu_solve((symbolic, numeric), side, probe, 1, memory);
     }
 
-    /// Whether the condition number of R A C leaves significant digits; `Err` holds the dof that moves most in its null
-    /// vector, and whether that is known.
+    /// Whether the condition number of R A C leaves significant digits; `Err` holds the dof with the largest entry of
+    /// its null vector, and whether that is known.
     fn judge(&mut self) -> std::result::Result<(), (usize, bool)> {
         let norm = (0..self.rows.len())
             .map(|dof| sum_of_sizes(&self.scaled[self.pattern.as_ref().col_range(dof)]))
@@ -303,14 +304,14 @@ impl<T: Real> Factor<T> {
         self.probe[worst] = T::one();
         self.solve_probe(Side::Given);
         let condition = generic.max(norm * sum_of_sizes(&self.probe));
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         match condition * T::of(16.0) * T::epsilon() <= T::one() {
             true => Ok(()),
             false => Err(verdict(&self.probe)),
         }
     }
 
-    /// The dof to name after an exactly zero pivot: that of the null vector of the matrix perturbed by rounding.
+    /// The dof to name after an exactly zero pivot: from the null vector of the matrix perturbed by rounding.
     fn name_singular(&mut self, found: usize) -> usize {
         for (at, value) in self.scaled.iter_mut().enumerate() {
             *value += *value * scatter::<T>(at) * T::of(8.0) * T::epsilon();

@@ -1,4 +1,4 @@
-//! The choice of an elimination order, with the dofs of contact behind all others.
+//! The choice of an elimination order, with the contact dofs after all others.
 
 use super::dissection;
 use super::elimination_tree::EliminationTree;
@@ -12,9 +12,10 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 
-/// The order in which [`Cholesky`](super::Cholesky) eliminates the dofs: it decides how many entries the factor has.
+/// The order in which [`Cholesky`](super::Cholesky) eliminates the dofs: it determines the number of entries of the
+/// factor.
 ///
-/// Whatever the order, the dofs that contact may act on come after all others.
+/// In any order, the dofs on which contact may act come after all others.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -45,27 +46,27 @@ use faer::sparse::linalg::cholesky::{
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Ordering {
-    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever has
-    /// fewer entries in the factor (zeros that faer adds where columns are much alike are not counted).
+    /// Minimum degree for chains, frames and plates; for solids minimum degree or nested dissection, whichever gives
+    /// fewer entries in the factor, not counting zeros that faer adds for very similar columns.
     #[default]
     Automatic,
-    /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): quickly found, and
-    /// hard to beat in one and two dimensions.
+    /// Approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl. 17, 1996): fast to compute,
+    /// and hard to beat in one and two dimensions.
     MinimumDegree,
-    /// Multilevel nested dissection of the matrix's graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998): for
-    /// solids much less fill, the more the larger they are. Needs nothing but the matrix, and gives the same order
-    /// every time.
+    /// Multilevel nested dissection of the matrix's graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998): much
+    /// less fill for solids, increasingly so for larger ones. Needs only the matrix, and is deterministic.
     NestedDissection,
-    /// Nested dissection by the coordinates of each dof (those of its node): halves along the longest axis, separated
-    /// by one layer of nodes. Found faster than [`NestedDissection`](Self::NestedDissection), and as good on regular
-    /// meshes of compact bodies. Dimensions that do not exist are zero.
+    /// Nested dissection by the coordinates of each dof's node: halves along the longest axis, separated by one layer
+    /// of nodes. Faster to compute than [`NestedDissection`](Self::NestedDissection), and as good on regular meshes
+    /// of compact bodies. Set unused dimensions to zero.
     Coordinates(Vec<[f64; 3]>),
-    /// The host's own order, each dof once: the first entry names the dof eliminated first.
+    /// The host's own order, each dof once: the first entry is the dof eliminated first.
     Given(Vec<usize>),
 }
 
-/// Entries in the factor for each dof from which on nested dissection is tried: blocks of seven elements a side and
-/// more have them. Plates and slender beams do not; dissected, they gain a few percent or lose (`benches/ordering.rs`).
+/// Number of factor entries per dof from which nested dissection is tried, as in blocks with at least seven elements
+/// per side. Plates and slender beams have fewer; dissection gains a few percent there or loses
+/// (`benches/ordering.rs`).
 const WORTHWHILE: u64 = 150;
 
 /// The symbolic factorization with `last` (ascending) eliminated last.
@@ -82,7 +83,8 @@ pub(crate) fn symbolic_cholesky(
         }
         _ => {}
     }
-    // A pattern that is not symmetric has no graph: entries that are zero to rounding stand on one side alone.
+    // A pattern that is not symmetric has no graph; it occurs if entries that are zero to rounding are stored on one
+    // side only.
     let Some(quotient) = Quotient::new(pattern, last)? else {
         return with_order(pattern, &moved_last(&minimum_degree(pattern)?, last));
     };
@@ -100,7 +102,7 @@ pub(crate) fn symbolic_cholesky(
         }
     };
     let symbolic = with_order(pattern, &quotient.expanded(&best.postordered()))?;
-    // Only structures as thin as a chain gain by elimination toward the contact.
+    // Only structures as thin as a chain benefit from elimination toward the contact.
     if last.is_empty() || !simplicial(&symbolic) || !matches!(ordering, Ordering::Automatic | Ordering::MinimumDegree) {
         return Ok(symbolic);
     }
@@ -108,7 +110,7 @@ pub(crate) fn symbolic_cholesky(
     Ok(if other.len_val() < symbolic.len_val() { other } else { symbolic })
 }
 
-/// An order of the vertices of a graph, with those of contact behind.
+/// An order of the vertices of a graph, with contact vertices last.
 struct Elimination {
     order: Vec<u32>,
     /// Vertices that are not eliminated last.
@@ -117,7 +119,7 @@ struct Elimination {
 }
 
 impl Elimination {
-    /// With an order of all vertices, or of all but those of contact.
+    /// With an order of all vertices, or of all except contact vertices.
     fn new(quotient: &Quotient, order: Vec<u32>) -> Self {
         let (mut order, mut last): (Vec<_>, Vec<_>) = order.into_iter().partition(|&vertex| !quotient.is_last(vertex));
         let interior = order.len();
@@ -133,7 +135,7 @@ impl Elimination {
         self.tree.fill
     }
 
-    /// The order with each branch of the tree in one piece.
+    /// The order with each branch of the tree contiguous.
     fn postordered(&self) -> Vec<u32> {
         self.tree.postordered(&self.order, self.interior)
     }
@@ -180,19 +182,19 @@ fn with_order(pattern: SymbolicSparseColMatRef<'_, usize>, order: &[usize]) -> R
     factorize_symbolic_cholesky(pattern, Side::Lower, order, CholeskySymbolicParams::default()).map_err(out_of_memory)
 }
 
-/// The same order with the dofs of `last` behind the others.
+/// The same order with the dofs of `last` after the others.
 fn moved_last(order: &[usize], last: &[usize]) -> Vec<usize> {
     let is_last = |dof: &usize| last.binary_search(dof).is_ok();
     let interior = order.iter().copied().filter(|dof| !is_last(dof));
     interior.chain(order.iter().copied().filter(is_last)).collect()
 }
 
-/// Each connected part from the dofs farthest from `last` (in the graph of the matrix) to those nearest.
+/// Each connected part from the dofs farthest from `last` (in the graph of the matrix) to the nearest ones.
 fn toward(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Vec<usize> {
     let n = pattern.nrows();
     let mut order = Vec::with_capacity(n);
     let mut reached = vec![false; n];
-    // Backward: a breadth-first walk from the contact dofs of one part after the other.
+    // Backward: a breadth-first search from the contact dofs of one part after the other.
     for start in last.iter().copied().chain(0..n) {
         if reached[start] {
             continue;

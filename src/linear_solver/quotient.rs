@@ -1,4 +1,5 @@
-//! The graph of a symmetric matrix in which dofs with the same neighbors, those of a node as a rule, are one vertex.
+//! The graph of a symmetric matrix in which dofs with the same neighbors, usually the dofs of a node, form one
+//! vertex.
 
 #[cfg(test)]
 pub(super) mod patterns;
@@ -8,12 +9,11 @@ use crate::error::Result;
 use crate::sparse::scattered;
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// The graph, and the dofs that its vertices stand for. Dofs that are eliminated last and the others are in different
-/// vertices.
+/// The graph, and the dofs of its vertices. Dofs eliminated last and other dofs are in different vertices.
 #[derive(Debug)]
 pub(super) struct Quotient {
     pub(super) graph: Graph,
-    /// The dofs of all vertices, one vertex after the other, and where each one's start.
+    /// The dofs of all vertices, one vertex after the other, and the start of each.
     dofs: Vec<usize>,
     starts: Vec<usize>,
     /// For each vertex, whether its dofs are eliminated last.
@@ -21,7 +21,7 @@ pub(super) struct Quotient {
 }
 
 impl Quotient {
-    /// Nothing if the pattern is not symmetric, or too large for 32 bits.
+    /// `None` if the pattern is not symmetric, or too large for 32 bits.
     pub(super) fn new(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Result<Option<Self>> {
         let n = pattern.nrows();
         if n.max(pattern.row_idx().len()) >= NONE as usize {
@@ -84,14 +84,14 @@ impl Quotient {
     }
 }
 
-/// For each dof a number that it shares with those neighbors that have the same neighbors as itself and, like it, are
-/// in `last` or not. (A collision would cost fill, nothing else.) Nothing if the pattern is not symmetric.
+/// For each dof a number that it shares with the neighbors that have the same neighbors and, like it, are in `last`
+/// or not. A collision would only increase fill. `None` if the pattern is not symmetric.
 fn keys(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Option<Vec<u64>> {
     let n = pattern.nrows();
     let scattered: Vec<u64> = (0..n).map(scattered).collect();
     let mut keys = vec![0_u64; n];
-    // The sum of h(i) g(j) − h(j) g(i) over all entries (i, j): entries on both sides of the diagonal cancel. (Both are
-    // scattered: with j itself for g(j) others cancel too, as (0, 1) and (0, 2) with (3, 0).)
+    // The sum of h(i) g(j) − h(j) g(i) over all entries (i, j): entries on both sides of the diagonal cancel. Both
+    // functions are hashes: with g(j) = j other entries would cancel too, such as (0, 1) and (0, 2) with (3, 0).
     let mut asymmetry = 0_u64;
     let other = |i: usize| scattered[i].rotate_left(32);
     for j in 0..n {
@@ -123,7 +123,7 @@ mod tests {
         let pattern = pattern(n, &pairs);
         let whole = Quotient::new(pattern.as_ref(), &[]).unwrap().unwrap();
         assert_eq!((whole.graph.size(), whole.graph.total()), (64, 192));
-        // A node of which one dof is eliminated last, and one of which all are.
+        // A node with one dof eliminated last, and one with all dofs eliminated last.
         let parts = Quotient::new(pattern.as_ref(), &[0, 3, 4, 5]).unwrap().unwrap();
         assert_eq!((parts.graph.size(), parts.graph.total()), (65, 192));
         let last: Vec<_> = (0..65).filter(|&vertex| parts.is_last(vertex)).map(|vertex| parts.dofs(vertex)).collect();
@@ -131,7 +131,7 @@ mod tests {
         assert!((0..65).any(|vertex| parts.dofs(vertex) == [1, 2]));
     }
 
-    /// Nodes with one dof and with three, and nodes that are tied by one of their dofs alone.
+    /// Nodes with one dof and with three, and nodes tied by only one of their dofs.
     #[test]
     fn vertices_are_dofs_with_the_same_neighbors() {
         for (n, pairs) in [frame(40), cube(3), (60, chain(60)), (80, strewn(80, 120, 7)), (30, vec![])] {

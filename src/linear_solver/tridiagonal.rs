@@ -351,7 +351,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
                     entry - lower[place] * coupling
                 }
             };
-            // (False for NaN.)
+            // False for NaN.
             let sound = pivot > negligible * entry;
             if !sound && failed.is_none() {
                 failed = Some(dof);

@@ -61,7 +61,7 @@ enum Method<T: Real> {
         /// Force and response in the order of dofs.
         vector: Vec<T>,
         /// Whether the factor has rows of other ranks too. All ranks then solve together, whatever their own parts of
-        /// force and response are, and leave nothing out: each would leave out something else.
+        /// force and response, and truncate nothing, because each would truncate something else.
         spans_ranks: bool,
     },
     /// Entries of the scaled M below its diagonal, row by row, and five vectors; five more for several forces once

@@ -9,12 +9,12 @@ use crate::real::Real;
 
 const FLEXIBILITY: &str = "flexibility of a body";
 
-/// The interface of a body: its flexibility, and the part of the rows that acts on it.
+/// The interface of a body: its flexibility, and its part of the rows.
 #[derive(Debug)]
 struct Body<T> {
     dofs: usize,
     flexibility: Vec<T>,
-    /// The rows that name it, ascending; their entries are those from `starts[k]` to `starts[k + 1]`.
+    /// The rows that name it, ascending; the entries of the k-th are `starts[k]..starts[k + 1]`.
     rows: Vec<usize>,
     starts: Vec<usize>,
     entries: Vec<(usize, T)>,
@@ -30,7 +30,7 @@ impl<T: Real> Body<T> {
         Ok(Self { dofs, flexibility: own, rows: Vec::new(), starts: vec![0], entries: Vec::new() })
     }
 
-    /// Takes its entries of a row.
+    /// Adds its entries of a row.
     fn take(&mut self, row: usize, body: usize, entries: &[(usize, usize, T)]) -> Result<()> {
         for &(_, dof, weight) in entries.iter().filter(|entry| entry.0 == body) {
             if dof >= self.dofs {
@@ -73,29 +73,29 @@ pub struct Assembled<T> {
 }
 
 impl<T: Real> Assembled<T> {
-    /// The multiplier of each row: positive where it presses, of either sign in ties and where [`Assembly::hold`]
-    /// holds. Of rows that depend on each other the least ones; what they do to the bodies is the same for all.
+    /// The multiplier of each row: positive if pressed, of either sign in ties and after [`Assembly::hold`]. Dependent
+    /// rows get the multipliers of least norm; their effect on the bodies is unique.
     pub fn multipliers(&self) -> &[T] {
         &self.multipliers
     }
 
-    /// The gap of each row with its forces, zero up to rounding where closed.
+    /// The gap of each row under the forces, zero to rounding if closed.
     pub fn gaps(&self) -> &[T] {
         &self.gaps
     }
 
-    /// Which rows are closed: ties, and those pressed by a force or with a gap within the rounding of the numbers that
-    /// it was computed from. (After [`Assembly::hold`]: the rows held.)
+    /// Which rows are closed: ties, and rows pressed by a force or with a gap within the rounding of its terms. After
+    /// [`Assembly::hold`]: the held rows.
     pub fn closed(&self) -> &[bool] {
         &self.closed
     }
 
-    /// The forces on the interface dofs of a body, Σ weight · multiplier; nothing for a body that is not there.
+    /// The forces on the interface dofs of a body, Σ weight · multiplier; empty for a body that does not exist.
     pub fn forces(&self, body: usize) -> &[T] {
         self.forces.get(body).map_or(&[], Vec::as_slice)
     }
 
-    /// The values of the interface dofs of a body under these forces; nothing for a body that is not there.
+    /// The values of the interface dofs of a body under these forces; empty for a body that does not exist.
     pub fn values(&self, body: usize) -> &[T] {
         self.values.get(body).map_or(&[], Vec::as_slice)
     }
@@ -106,31 +106,31 @@ impl<T: Real> Assembled<T> {
     }
 }
 
-/// Any number of bodies that live in codes of their own, joined by rows over their interface dofs: the interface
-/// problem of localized Lagrange multipliers (Park, Felippa, Gumaste, Comput. Mech. 24, 2000), or the dual assembly of
+/// Any number of bodies in separate codes, joined by rows over their interface dofs: the interface problem of
+/// localized Lagrange multipliers (Park, Felippa, Gumaste, Comput. Mech. 24, 2000), or the dual assembly of
 /// substructures (de Klerk, Rixen, Voormeeren, AIAA J. 46, 2008) with contact.
 ///
 /// Body s has the values d_s = free_s + F_s p_s under forces p_s on its interface dofs, and the rows G_s. With one
-/// multiplier a row,
+/// multiplier per row,
 ///
 /// ```text
 /// p_s = G_sᵀ λ,   g = Σ_s G_s d_s + gap,   0 ≤ g ⊥ λ ≥ 0   (g = 0 in ties)
 /// 0 ≤ W λ + Σ_s G_s free_s + gap ⊥ λ ≥ 0,   W = Σ_s G_s F_s G_sᵀ
 /// ```
 ///
-/// which any [`ContactSolver`] takes. Localized multipliers tie each body to a massless frame by multipliers l_s of its
-/// own; the equilibrium of the frame makes them all equal to λ, and eliminates it (`docs/theory.md`, section 17). Where
-/// k bodies meet in a point, k − 1 independent rows, or all k (k − 1)/2 between two of them, say the same: rows may
-/// depend on each other.
+/// which any [`ContactSolver`] can solve. Localized multipliers tie each body to a massless frame by its own
+/// multipliers l_s; the equilibrium of the frame makes them all equal to λ, which eliminates the frame
+/// (`docs/theory.md`, section 17). If k bodies meet in a point, k − 1 independent rows and all k (k − 1)/2 rows
+/// between two bodies are equivalent: rows may be dependent.
 ///
-/// A body needs to know neither the others nor their codes: its step goes on with the [`forces`](Assembled::forces).
-/// The loop of a host is that of a [`Frame`](super::Frame): each body advances without contact, then comes
-/// [`solve`](Self::solve), then each body adds the response to its forces; rates are made to agree by
-/// [`hold`](Self::hold) of a second assembly, whose flexibilities are G_s-wise those of M⁻¹. Bodies advance and respond
-/// independently, side by side if there are threads.
+/// A body needs no knowledge of the others or their codes: its step continues with the [`forces`](Assembled::forces).
+/// The loop of a host is the same as for a [`Frame`](super::Frame): each body advances without contact, then
+/// [`solve`](Self::solve) is called, then each body adds the response to its forces. [`hold`](Self::hold) of a second
+/// assembly, with the flexibilities of M⁻¹, makes rates agree. Bodies advance and respond independently, in parallel
+/// if there are threads.
 ///
-/// W is dense: for R rows R² numbers, and the flexibility of a body with n interface dofs takes n solves once and n²
-/// numbers. That suits some thousand rows.
+/// W is dense: R² numbers for R rows. The flexibility of a body with n interface dofs needs n solves once, and n²
+/// numbers. This suits some thousand rows.
 ///
 /// ```
 /// use contact_dynamics::partitioned::{Assembly, Coupling};
@@ -162,10 +162,10 @@ pub struct Assembly<T: Real> {
     /// Which rows are ties.
     equalities: Vec<bool>,
     problem: Problem<T>,
-    /// Whether the problem has W of its rows, and the place of each row among these.
+    /// Whether the problem has the W of its rows, and the place of each row in the problem.
     formed: bool,
     places: Vec<Option<usize>>,
-    /// Offsets of all rows, and what of them is rounding.
+    /// Offsets of all rows, and their rounding.
     offsets: Vec<T>,
     roundings: Vec<T>,
     /// A response of a body.
@@ -176,16 +176,16 @@ pub struct Assembly<T: Real> {
 impl<T: Real> Assembly<T> {
     /// Bodies with these flexibilities, coupled by rows, solved by [`ActiveSet`].
     ///
-    /// Entry i + j n of a flexibility is what a unit force on interface dof j of the body adds to the value of its dof
-    /// i (n dofs, symmetric, positive semidefinite). For displacements of an implicit step that is w_u A⁻¹ with the
-    /// effective matrix A of the body, for velocities and accelerations M⁻¹ per unit of impulse and force, in the rows
-    /// and columns of the interface; all zero for a rigid obstacle.
+    /// Entry i + j n of a flexibility is the change of the value of the body's interface dof i by a unit force on its
+    /// dof j (n dofs, symmetric, positive semidefinite). For displacements of an implicit step it is w_u A⁻¹ with the
+    /// effective matrix A of the body, for velocities and accelerations M⁻¹ per unit of impulse and force, in the
+    /// rows and columns of the interface; all zero for a rigid obstacle.
     ///
     /// # Errors
     ///
     /// [`Error::Dimension`], [`Error::NotFinite`], [`Error::Asymmetric`] and [`Error::Singular`] for wrong
-    /// flexibilities, [`Error::Incompatible`] for rows that name what is not there, [`Error::NotFinite`] for their
-    /// weights, [`Error::OutOfMemory`] if the dense problem of so many rows does not fit.
+    /// flexibilities, [`Error::Incompatible`] for rows that name missing bodies or dofs, [`Error::NotFinite`] for
+    /// their weights, [`Error::OutOfMemory`] if the dense problem does not fit.
     pub fn new(flexibilities: &[&[T]], rows: &[Coupling<T>]) -> Result<Self> {
         Self::with_solver(flexibilities, rows, ActiveSet::default())
     }
@@ -248,11 +248,11 @@ impl<T: Real> Assembly<T> {
         self.equalities.len()
     }
 
-    /// Replaces the flexibility of a body, whose matrix has changed.
+    /// Replaces the flexibility of a body whose matrix has changed.
     ///
     /// # Errors
     ///
-    /// Those of [`new`](Self::new), also for a body that is not there; nothing has changed then.
+    /// The errors of [`new`](Self::new), also for a body that does not exist; the assembly is then unchanged.
     pub fn set_flexibility(&mut self, body: usize, flexibility: &[T]) -> Result<()> {
         let count = self.bodies.len();
         let Some(body) = self.bodies.get_mut(body) else {
@@ -265,22 +265,22 @@ impl<T: Real> Assembly<T> {
         Ok(())
     }
 
-    /// Contact and ties: forces that press on rows whose gap would close, and those that keep ties. `free` are the
+    /// Contact and ties: forces that press on rows whose gap would close, and forces that keep ties. `free` are the
     /// values of each body without contact, `gaps` the gaps at zero values of all bodies, positive when open.
     ///
-    /// Multipliers of the call before are the first guess; they may change the work, not the result. W is formed by the
-    /// first call, and when a flexibility or the choice of rows has changed. Does not allocate.
+    /// The multipliers of the previous call are the initial guess; they may change the work, not the result. W is
+    /// formed in the first call, and when a flexibility or the choice of rows has changed. Does not allocate.
     ///
     /// # Errors
     ///
     /// [`Error::Dimension`] and [`Error::NotFinite`] for wrong values, [`Error::Frame`] if no forces were found. The
-    /// assembly can be used again.
+    /// assembly remains usable.
     pub fn solve(&mut self, free: &[&[T]], gaps: &[T]) -> Result<&Assembled<T>> {
         self.run(free, gaps, None)
     }
 
-    /// The rows of which `held` is true closed, whatever force that takes, and no force on the others, ties included:
-    /// jumps of velocity or acceleration (`gaps` zero), whose multipliers are then impulses or forces.
+    /// Closes the rows with a true `held`, by forces of any sign and size, without force on the others, including
+    /// ties. For jumps of velocity or acceleration (`gaps` zero); the multipliers are then impulses or forces.
     ///
     /// With flexibilities M⁻¹ this is the projection of [`JumpProjection`](crate::JumpProjection), S = W: momentum is
     /// conserved, kinetic energy falls.
@@ -314,7 +314,7 @@ impl<T: Real> Assembly<T> {
         Ok(&self.assembled)
     }
 
-    /// The rows of the problem; W is kept if they are the ones of the call before.
+    /// Selects the rows of the problem; W is kept if they are the same as in the previous call.
     fn choose(&mut self, held: Option<&[bool]>) {
         let Self { problem, places, formed, .. } = self;
         let chosen = |row: usize| held.is_none_or(|held| held[row]);
@@ -327,7 +327,7 @@ impl<T: Real> Assembly<T> {
         }
     }
 
-    /// W of the rows chosen, body by body.
+    /// Forms W of the selected rows, body by body.
     fn form(&mut self) {
         let Self { bodies, problem, places, response, formed, .. } = self;
         let size = problem.rows.len();
@@ -353,7 +353,7 @@ impl<T: Real> Assembly<T> {
         *formed = true;
     }
 
-    /// The gaps without forces, and their rounding.
+    /// Computes the gaps without forces, and their rounding.
     fn measure(&mut self, free: &[&[T]], gaps: &[T]) {
         self.offsets.copy_from_slice(gaps);
         for (rounding, gap) in self.roundings.iter_mut().zip(gaps) {
@@ -370,7 +370,7 @@ impl<T: Real> Assembly<T> {
         }
     }
 
-    /// The contact problem, from the multipliers of the call before.
+    /// Sets up the contact problem, starting from the multipliers of the previous call.
     fn set_out(&mut self, hold: bool) {
         let Self { problem, equalities, offsets, roundings, assembled, .. } = self;
         let Problem { rows, multipliers, offset, tolerance, sets, .. } = problem;
@@ -387,7 +387,7 @@ impl<T: Real> Assembly<T> {
         }));
     }
 
-    /// What the multipliers do to the bodies.
+    /// Computes the effect of the multipliers on the bodies.
     fn answer(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) {
         let Assembled { multipliers, gaps: open, closed, forces, values, .. } = &mut self.assembled;
         for (&row, &multiplier) in self.problem.rows.iter().zip(&self.problem.multipliers) {

@@ -7,16 +7,17 @@ use crate::real::Real;
 
 /// The interface of a body: its values without contact, and its flexibility.
 ///
-/// Values are those along the normal of each frame node. The normal points from the first side to the second, for both.
-/// They may be displacements, velocities or accelerations, with the flexibility to match.
+/// Values are taken along the normal of each frame node, which points from the first side to the second for both.
+/// They may be displacements, velocities or accelerations, with the corresponding flexibility.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Side<'a, T> {
     /// Values along the normals without contact.
     pub free: &'a [T],
-    /// Entry i + j n: what a unit force along the normal on node j adds to the value of node i (n nodes, symmetric,
-    /// positive semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix A of the
-    /// body, for velocities and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid obstacle.
+    /// Entry i + j n: the change of the value of node i by a unit force along the normal on node j (n nodes,
+    /// symmetric, positive semidefinite). For displacements of an implicit step w_u G A⁻¹Gᵀ with the effective matrix
+    /// A of the body, for velocities and accelerations G M⁻¹Gᵀ per unit of impulse and force; all zero for a rigid
+    /// obstacle.
     pub flexibility: &'a [T],
 }
 
@@ -39,14 +40,14 @@ pub struct Interface<T> {
 }
 
 impl<T: Real> Interface<T> {
-    /// The force l on each node, positive in compression (of either sign where [`Frame::hold`] holds): the second side
-    /// gets +l along the normal, the first −l. The multipliers of both sides are equal, because the frame has no mass.
+    /// The force l on each node, positive in compression (of either sign after [`Frame::hold`]): the second side gets
+    /// +l along the normal, the first −l. The multipliers of both sides are equal, because the frame has no mass.
     pub fn forces(&self) -> &[T] {
         &self.forces
     }
 
-    /// Positions of the frame, in the values of the first side: where closed, those of both sides; where open, halfway
-    /// between them (no force acts there, and any position between them would do).
+    /// Positions of the frame, as values of the first side: if closed, the values of both sides; if open, halfway
+    /// between them, where any position would be valid, because no force acts.
     pub fn positions(&self) -> &[T] {
         &self.positions
     }
@@ -56,13 +57,13 @@ impl<T: Real> Interface<T> {
         [&self.values[0], &self.values[1]]
     }
 
-    /// Gaps between both sides, zero up to rounding where closed, positive where open.
+    /// Gaps between both sides, zero to rounding if closed, positive if open.
     pub fn gaps(&self) -> &[T] {
         &self.gaps
     }
 
-    /// Where the sides are closed: pressed by a force, or with a gap within the rounding of the numbers that it was
-    /// computed from. (After [`Frame::hold`]: the nodes held.)
+    /// Which nodes are closed: pressed by a force, or with a gap within the rounding of its terms. After
+    /// [`Frame::hold`]: the held nodes.
     pub fn closed(&self) -> &[bool] {
         &self.closed
     }
@@ -73,34 +74,35 @@ impl<T: Real> Interface<T> {
     }
 }
 
-/// A frame between two bodies whose contact nodes match: the interface problem of localized Lagrange multipliers (Park,
-/// Felippa, Gumaste, Comput. Mech. 24, 2000; with contact Rebel, Park, Felippa, Int. J. Numer. Methods Eng. 54, 2002).
+/// A frame between two bodies with matching contact nodes: the interface problem of localized Lagrange multipliers
+/// (Park, Felippa, Gumaste, Comput. Mech. 24, 2000; with contact Rebel, Park, Felippa, Int. J. Numer. Methods Eng.
+/// 54, 2002).
 ///
-/// Each side s is tied to the frame by multipliers of its own, l_s, the frame has displacements x and no mass. With d_s
-/// the values of the sides under their forces, and all of the gap between the frame and the second side:
+/// Each side s is tied to the frame by its own multipliers l_s; the frame has displacements x and no mass. With d_s
+/// the values of the sides under their forces, and the whole gap between the frame and the second side:
 ///
 /// ```text
 /// d_1 = free_1 − F_1 l_1,   d_2 = free_2 + F_2 l_2
 /// 0 ≤ x − d_1 ⊥ l_1 ≥ 0,    0 ≤ d_2 + gap − x ⊥ l_2 ≥ 0,    l_1 − l_2 = 0 (equilibrium of the frame)
 /// ```
 ///
-/// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] takes.
-/// A body needs to know neither the other one nor its code: its step goes on with the forces of the frame. Results are
-/// those of the monolithic form up to rounding (`tests/partitioned/frames.rs`).
+/// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] can
+/// solve. A body needs no knowledge of the other one or its code: its step continues with the forces of the frame.
+/// Results equal those of the monolithic form up to rounding (`tests/partitioned/frames.rs`).
 ///
-/// A side may stand for several bodies, with a flexibility of one block for each: of bodies in a row every other one
-/// belongs to the first side. Three bodies that touch each other, and nodes that do not match, take an
+/// A side may combine several bodies, with a block-diagonal flexibility: of bodies in a row every other one belongs
+/// to the first side. For three bodies in mutual contact, and for nodes that do not match, use an
 /// [`Assembly`](super::Assembly).
 ///
 /// An explicit or implicit step of the host:
 ///
 /// 1. each body advances without contact, `free`, and solves for unit forces on its interface (once while its matrix
-///    stays);
+///    is unchanged);
 /// 2. [`solve`](Self::solve);
 /// 3. each body adds the response to its forces;
-/// 4. if velocities (then accelerations) are to agree with the contact, as of
-///    [`PersistencyCorrection`](crate::PersistencyCorrection): [`hold`](Self::hold) on the closed nodes. A second frame
-///    for that keeps the factors of both.
+/// 4. to make velocities (then accelerations) agree with the contact, as
+///    [`PersistencyCorrection`](crate::PersistencyCorrection) does: [`hold`](Self::hold) on the closed nodes. A
+///    second frame for this keeps the factors of both.
 ///
 /// ```
 /// use contact_dynamics::partitioned::{Frame, Side};
@@ -127,19 +129,19 @@ pub struct Frame<T: Real> {
 }
 
 impl<T: Real> Frame<T> {
-    /// A frame of so many nodes, solved by [`ActiveSet`]. A node of a tie in several directions counts once for each of
-    /// them.
+    /// A frame with this many nodes, solved by [`ActiveSet`]. A node tied in several directions counts once for each
+    /// of them.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem of so many nodes does not fit.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem does not fit.
     pub fn new(nodes: usize) -> Result<Self> {
         Self::with_solver(nodes, ActiveSet::default())
     }
 
     /// The same with a solver of the host's choice.
     ///
-    /// # Errors
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem does not fit.
     ///
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem of so many nodes does not fit.
     pub fn with_solver(nodes: usize, solver: impl ContactSolver<T> + 'static) -> Result<Self> {
@@ -156,21 +158,22 @@ impl<T: Real> Frame<T> {
         Ok(Self { problem, interface })
     }
 
-    /// Contact: forces that press, on nodes whose gap would close. `gaps` are those at zero values of both sides,
+    /// Contact: forces that press, on nodes whose gap would close. `gaps` are the gaps at zero values of both sides,
     /// positive when open.
     ///
-    /// Forces of the call before are the first guess; they may change the work, not the result. Does not allocate.
+    /// The forces of the previous call are the initial guess; they may change the work, not the result. Does not
+    /// allocate.
     ///
     /// # Errors
     ///
     /// `Dimension`, `NotFinite`, `Asymmetric` and `Singular` (`dof` is the frame node) of [`Error`](crate::Error) for
-    /// wrong sides, `Frame` if no forces were found. The frame can be used again.
+    /// wrong sides, `Frame` if no forces were found. The frame remains usable.
     pub fn solve(&mut self, sides: [Side<'_, T>; 2], gaps: &[T]) -> Result<&Interface<T>> {
         self.run(sides, gaps, None)
     }
 
-    /// Both sides together on the nodes of which `held` is true, whatever force that takes, and no force on the others:
-    /// ties, and jumps of velocity or acceleration (`gaps` zero), whose forces are then impulses or forces.
+    /// Joins both sides at the nodes with a true `held`, by forces of any sign and size, without force on the others.
+    /// For ties, and for jumps of velocity or acceleration (`gaps` zero), whose forces are then impulses or forces.
     ///
     /// With flexibilities G M⁻¹Gᵀ this is the projection of [`JumpProjection`](crate::JumpProjection), S = F_1 + F_2:
     /// momentum is conserved, kinetic energy falls.
@@ -194,7 +197,7 @@ impl<T: Real> Frame<T> {
         let Problem { rows: nodes, multipliers, delassus, version, offset, tolerance, sets, .. } = problem;
         nodes.clear();
         nodes.extend((0..n).filter(|&node| held.is_none_or(|held| held[node])));
-        // A version number for each W, so that the solver can keep its factor while W stays.
+        // Each W gets a version number, so that the solver can keep its factor while W is unchanged.
         let size = nodes.len();
         let mut changed = delassus.len() != size * size;
         delassus.resize(size * size, T::zero());
@@ -239,7 +242,7 @@ impl<T: Real> Frame<T> {
     }
 }
 
-/// Refuses sides of wrong sizes, and flexibilities that are none.
+/// Rejects sides of wrong sizes, and invalid flexibilities.
 fn check<T: Real>(side: &Side<'_, T>, n: usize) -> Result<()> {
     let Side { free, flexibility } = side;
     check_length("free values of a side", free.len(), n)?;

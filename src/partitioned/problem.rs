@@ -1,19 +1,18 @@
-//! What the frames share: the contact problem of the rows chosen, its solver and its memory, and checks of what hosts
-//! hand over.
+//! Shared parts of frames: the contact problem of the selected rows, its solver and memory, and checks of host data.
 
 use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 
-/// The contact problem of some of the rows.
+/// The contact problem of selected rows.
 #[derive(Debug)]
 pub(super) struct Problem<T: Real> {
     solver: Box<dyn ContactSolver<T>>,
     /// The rows in the problem, and their multipliers.
     pub(super) rows: Vec<usize>,
     pub(super) multipliers: Vec<T>,
-    /// W of these rows, and how often it has changed.
+    /// W of these rows, and its version.
     pub(super) delassus: Vec<T>,
     pub(super) version: u64,
     pub(super) offset: Vec<T>,
@@ -22,10 +21,10 @@ pub(super) struct Problem<T: Real> {
 }
 
 impl<T: Real> Problem<T> {
-    /// Memory for so many rows; `what` names it if there is not enough.
+    /// Memory for this many rows; `what` names it if there is not enough.
     pub(super) fn new(rows: usize, mut solver: Box<dyn ContactSolver<T>>, what: &'static str) -> Result<Self> {
-        // Memory is tried first, that of the solver included (its `reserve` cannot fail), so that an absurd number is
-        // an error and not an abort.
+        // Try to allocate the memory first, including the solver's (its `reserve` cannot fail), so that an absurd
+        // number is an error and not an abort.
         memory::reserve::<T>(rows, rows.saturating_mul(8), what)?;
         let delassus = memory::reserve(rows, rows, what)?;
         solver.reserve(rows);
@@ -41,7 +40,7 @@ impl<T: Real> Problem<T> {
         })
     }
 
-    /// Finds the multipliers, from those that are there.
+    /// Finds the multipliers, starting from the present ones.
     pub(super) fn solve(&mut self) -> Result<usize> {
         let Self { solver, rows, multipliers, delassus, version, offset, tolerance, sets } = self;
         let problem = ContactProblem::of(delassus, offset, sets, tolerance, *version);
@@ -49,7 +48,7 @@ impl<T: Real> Problem<T> {
     }
 }
 
-/// What of a value that is a sum of terms of this size is rounding.
+/// The rounding of a sum of terms of this magnitude.
 pub(super) fn rounding<T: Real>(size: T) -> T {
     T::of(64.0) * T::epsilon() * size
 }
@@ -85,7 +84,7 @@ pub(super) fn check_finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
     }
 }
 
-/// Refuses flexibilities of another number of dofs than n, with a negative diagonal entry, or that are not symmetric
+/// Rejects flexibilities whose number of dofs is not n, with a negative diagonal entry, or that are not symmetric
 /// (columns may have been stored as rows, or solved for with other normals).
 pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], n: usize) -> Result<()> {
     check_length(what, flexibility.len(), n * n)?;
@@ -96,7 +95,7 @@ pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], 
             return Err(Error::Singular { matrix: what, dof: column });
         }
         for row in 0..column {
-            // Columns come from solves, whose error depends on the condition of the body's matrix.
+            // Columns are results of solves, whose error depends on the condition of the body's matrix.
             let scale = entry(row, row).max(entry(column, column));
             let (value, mirrored) = (entry(row, column), entry(column, row));
             if (value - mirrored).abs() > T::epsilon().sqrt() * scale {

@@ -1,4 +1,4 @@
-//! What ranks agree on: sums, largest values, and that none of them has failed.
+//! Agreement between ranks: sums, largest values, and that none has failed.
 
 use super::Ranks;
 use crate::error::{Error, Result};
@@ -7,11 +7,11 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Sums that travel together. Every question to the ranks begins with as many values, so that a rank that has failed
-/// somewhere, and says so, is understood by ranks that wait with a question of another kind.
+/// Number of sums in one message. Every request to the ranks starts with this many values, so that a rank that has
+/// failed and reports it is understood by ranks that wait in another request.
 const SUMS: usize = 6;
 
-/// Words of the message of a failed rank, six bytes each: an f64 holds integers below 2⁴⁸ exactly.
+/// Number of words in the message of a failed rank, six bytes each: an f64 represents integers below 2⁴⁸ exactly.
 const WORDS: usize = 40;
 const BYTES: usize = 6;
 
@@ -24,17 +24,17 @@ pub(crate) struct Together<T: Real> {
 #[derive(Debug)]
 struct Agreement<T: Real> {
     ranks: Arc<dyn Ranks<T>>,
-    /// Whether all ranks know of the failure that is on its way up.
+    /// Whether all ranks know of the failure that is being returned.
     announced: AtomicBool,
 }
 
 impl<T: Real> Together<T> {
-    /// With the ranks that a system has, if it has any.
+    /// With the ranks of a system, if it has any.
     pub(crate) fn new(ranks: Option<Arc<dyn Ranks<T>>>) -> Self {
         Self { ranks: ranks.map(|ranks| Arc::new(Agreement { ranks, announced: AtomicBool::new(false) })) }
     }
 
-    /// Whether there are no ranks but this one.
+    /// Whether there are no other ranks.
     pub(crate) fn is_alone(&self) -> bool {
         self.ranks.is_none()
     }
@@ -52,42 +52,42 @@ impl<T: Real> Together<T> {
         owned[..owned.partition_point(|range| range.start <= dof)].last().is_some_and(|range| range.contains(&dof))
     }
 
-    /// Spreads the values of owners.
+    /// Distributes the values of owners.
     pub(crate) fn share(&self, values: &mut [T]) -> Result<()> {
         let Some(agreement) = &self.ranks else { return Ok(()) };
         let result = agreement.ranks.share(values);
         agreement.unreachable(result)
     }
 
-    /// The sum of products of all dofs.
+    /// The scalar product over all dofs.
     pub(crate) fn dot(&self, x: &[T], y: &[T]) -> Result<T> {
         let [sum] = self.sum(Ok([self.part_of_dot(x, y).value()]))?;
         Ok(T::of(sum))
     }
 
-    /// What this rank has of the sum of products of all dofs.
+    /// This rank's part of the scalar product over all dofs.
     pub(crate) fn part_of_dot(&self, x: &[T], y: &[T]) -> T {
         let products = |part: Range<usize>| x[part.clone()].iter().zip(&y[part]).map(|(&x, &y)| x * y).sum::<T>();
         self.owned(x.len()).map(products).sum()
     }
 
-    /// What this rank has of the work of a force on the way from one displacement to another.
+    /// This rank's part of the work of a force along a displacement increment.
     pub(crate) fn part_of_work(&self, [from, to]: [&[T]; 2], force: impl Fn(usize) -> T) -> T {
         let own = |part: Range<usize>| part.map(|dof| (to[dof] - from[dof]) * force(dof)).sum::<T>();
         self.owned(to.len()).map(own).sum()
     }
 
-    /// Fails on all ranks if it has failed on one.
+    /// Fails on all ranks if one has failed.
     pub(crate) fn agree<R>(&self, result: Result<R>) -> Result<R> {
         let Some(agreement) = &self.ranks else { return result };
         match result {
             Ok(value) => agreement.sum(Ok([])).map(|[]| value),
-            // (Where one has failed there is no sum.)
+            // If one has failed there is no sum.
             Err(error) => agreement.sum(Err(error)).and_then(|[]| Err(Error::Poisoned)),
         }
     }
 
-    /// Sums over all ranks; fails on all if it has failed on one.
+    /// Sums over all ranks; fails on all if one has failed.
     pub(crate) fn sum<const N: usize>(&self, part: Result<[f64; N]>) -> Result<[f64; N]> {
         match &self.ranks {
             None => part,
@@ -95,7 +95,7 @@ impl<T: Real> Together<T> {
         }
     }
 
-    /// The largest values of all ranks; fails on all if it has failed on one.
+    /// The largest values over all ranks; fails on all if one has failed.
     pub(crate) fn max<const N: usize>(&self, part: Result<[f64; N]>) -> Result<[f64; N]> {
         let Some(agreement) = &self.ranks else { return part };
         let mut values = self.agree(part)?;
@@ -103,14 +103,14 @@ impl<T: Real> Together<T> {
         Ok(values)
     }
 
-    /// The end of what can fail as a whole, a step or a build: the error does not go up to another agreement.
+    /// Ends an operation that can fail as a whole, a step or a build: the error is not passed to another agreement.
     pub(crate) fn finish<R>(&self, result: Result<R>) -> Result<R> {
         let result = self.agree(result);
         self.caught();
         result
     }
 
-    /// A failure of which all ranks know does not go up any further.
+    /// A failure that all ranks know of ends here.
     pub(crate) fn caught(&self) {
         if let Some(agreement) = &self.ranks {
             agreement.announced.store(false, Ordering::Relaxed);
@@ -119,7 +119,7 @@ impl<T: Real> Together<T> {
 }
 
 impl<T: Real> Agreement<T> {
-    /// Sums with word of how many ranks have failed for good, and how many so that a smaller step may help.
+    /// Sums values together with the number of ranks that have failed unrecoverably and recoverably.
     fn sum<const N: usize>(&self, part: Result<[f64; N]>) -> Result<[f64; N]> {
         const { assert!(N <= SUMS, "more sums than travel together") };
         let mut values = [0.0; SUMS + 2];
@@ -128,7 +128,7 @@ impl<T: Real> Agreement<T> {
                 values[..N].copy_from_slice(&part);
                 None
             }
-            // All know, and nobody waits for this rank.
+            // All ranks know, and none waits for this one.
             Err(error) if self.announced.load(Ordering::Relaxed) => return Err(error),
             Err(error) => {
                 values[if error.is_recoverable() { SUMS + 1 } else { SUMS }] = 1.0;
@@ -146,7 +146,7 @@ impl<T: Real> Agreement<T> {
         Ok(sums)
     }
 
-    /// The error of this rank: its own, or the word of the first of those that failed worst.
+    /// The error of this rank: its own, or the message of the first rank with the worst failure.
     fn report(&self, own: Option<Error>, lost: bool) -> Result<Error> {
         let own = own.filter(|error| error.is_recoverable() != lost);
         let number = self.ranks.rank() as f64;
@@ -158,19 +158,19 @@ impl<T: Real> Agreement<T> {
             write_words(&error.to_string(), &mut words);
         }
         self.unreachable(self.ranks.sum(&mut words))?;
-        // (Numbers of ranks are exact in f64.)
+        // Rank numbers are exact in f64.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of a rank")]
         let rank = -first[0] as usize;
         Ok(own.unwrap_or_else(|| Error::OtherRank { rank, recoverable: !lost, message: read_words(&words) }))
     }
 
-    /// Where ranks cannot be reached nothing is asked of them any more.
+    /// If ranks cannot be reached, no further requests are made.
     fn unreachable<R>(&self, result: Result<R>) -> Result<R> {
         result.inspect_err(|_| self.announced.store(true, Ordering::Relaxed))
     }
 }
 
-/// A text as numbers, cut to what fits.
+/// Encodes a text as numbers, truncated to fit.
 fn write_words(text: &str, words: &mut [f64]) {
     let mut end = text.len().min(words.len() * BYTES);
     while !text.is_char_boundary(end) {
@@ -181,7 +181,7 @@ fn write_words(text: &str, words: &mut [f64]) {
     }
 }
 
-/// The text of such numbers.
+/// Decodes the text of such numbers.
 fn read_words(words: &[f64]) -> String {
     let mut bytes = Vec::with_capacity(words.len() * BYTES);
     for &word in words {

@@ -1,11 +1,10 @@
-//! What is checked of ranks when a run is built: numbers that must be the same on all, who owns what, and the order of
-//! the contact dofs.
+//! Checks of ranks when a run is built: numbers that must agree, ownership, and the order of the contact dofs.
 
 use super::{Ranks, Together};
 use crate::error::{Error, Result};
 use crate::real::Real;
 
-/// Refuses ranges that are not ascending, or beyond the dofs of the rank.
+/// Rejects ranges that do not ascend or exceed the dofs of the rank.
 pub(crate) fn check_owned<T: Real>(ranks: &dyn Ranks<T>, dofs: usize) -> Result<()> {
     let mut end = 0;
     for range in ranks.owned() {
@@ -21,7 +20,7 @@ pub(crate) fn check_owned<T: Real>(ranks: &dyn Ranks<T>, dofs: usize) -> Result<
     Ok(())
 }
 
-/// Refuses numbers that differ between ranks.
+/// Rejects numbers that differ between ranks.
 pub(crate) fn check_alike<T: Real, const N: usize>(
     together: &Together<T>,
     names: [&'static str; N],
@@ -42,7 +41,7 @@ pub(crate) fn check_alike<T: Real, const N: usize>(
     Ok(())
 }
 
-/// Refuses contact dofs that no rank owns, or several, and those that do not come in the same order on all ranks.
+/// Rejects contact dofs with no owner or several, or with different orders on different ranks.
 pub(crate) fn check_interface<T: Real>(together: &Together<T>, dofs: usize, interface: &[usize]) -> Result<()> {
     if together.is_alone() {
         return Ok(());

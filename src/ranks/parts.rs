@@ -4,17 +4,17 @@ use crate::error::{Error, Result};
 use crate::linear_solver;
 use faer::sparse::SymbolicSparseColMatRef;
 
-/// Cuts a body into `count` parts, of as many dofs each, with few neighbors in other parts: which part each row of the
-/// pattern belongs to, from 0.
+/// Cuts a body into `count` parts with similar numbers of dofs and few neighbors in other parts; returns the part of
+/// each row of the pattern, from 0.
 ///
-/// The pattern (both triangles, entries on the diagonal or none) is that of a matrix of the whole body, or of its
-/// nodes: an entry for each two that share an element. Rows with the same neighbors, as the dofs of a node, stay
-/// together where the diagonal has entries. Parts are pieces of the multilevel nested dissection by which
-/// [`Cholesky`](crate::Cholesky) orders solids (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998), the same in every
-/// run, so every [rank](crate::ranks::Ranks) can cut by itself; they are of no simple shape, and may be of several
-/// pieces. A part may be empty where there are more of them than rows.
+/// The pattern (both triangles, with or without diagonal entries) is that of a matrix of the whole body, or of its
+/// nodes, with an entry for each two nodes of an element. Rows with the same neighbors, such as the dofs of a node,
+/// stay together if the diagonal has entries. Parts are pieces of the multilevel nested dissection by which
+/// [`Cholesky`](crate::Cholesky) orders solids (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998). They are the same
+/// in every run, so every [rank](crate::ranks::Ranks) can compute them itself. Their shapes are irregular, they may
+/// consist of several pieces, and some are empty if there are more parts than rows.
 ///
-/// For graphs that one process can hold. Hosts of larger ones, which have a partition of their own, keep it.
+/// For graphs that fit in one process. Hosts of larger ones should use their own partition.
 ///
 /// # Errors
 ///

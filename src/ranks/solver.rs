@@ -1,4 +1,5 @@
-//! A linear solver over ranks as steps see it: solutions are shared, and no solve begins before all ranks agree.
+//! The wrapper of a linear solver for steps over ranks: shares solutions, and starts a solve only when all ranks
+//! agree.
 
 use super::Together;
 use crate::error::{Error, Result};
@@ -25,7 +26,7 @@ struct AgreedFactorization<T: Real> {
     inner: Box<dyn Factorization<T>>,
     together: Together<T>,
     dofs: usize,
-    /// The largest of all ranks, so that all decide alike.
+    /// The largest value over all ranks, so that all decide alike.
     stored_values: usize,
 }
 
@@ -64,7 +65,7 @@ impl<T: Real> LinearSolver<T> for AgreedSolver<'_, T> {
 }
 
 impl<T: Real> AgreedFactorization<T> {
-    /// Shares the columns of a solution. A rank that has failed takes part, for the others do not know yet.
+    /// Shares the columns of a solution. A rank that has failed takes part too, because the others do not know yet.
     fn shared(&self, result: Result<()>, solution: &mut [T]) -> Result<()> {
         for column in solution.chunks_exact_mut(self.dofs.max(1)) {
             self.together.share(column)?;

@@ -1,4 +1,5 @@
-//! A system over ranks as steps see it: forces are shared, energies summed, and nothing begins before all agree.
+//! The wrapper of a system for steps over ranks: shares forces, sums energies, and proceeds only when all ranks
+//! agree.
 
 use super::{Ranks, Together};
 use crate::error::Result;
@@ -12,7 +13,7 @@ use std::sync::Arc;
 pub(crate) struct AgreedSystem<'a, T: Real> {
     inner: Box<dyn System<T> + 'a>,
     together: Together<T>,
-    /// The lumped mass, that of its owner at each dof.
+    /// The lumped mass, with the owner's value at each dof.
     mass: Vec<T>,
 }
 
@@ -29,7 +30,7 @@ impl<'a, T: Real> AgreedSystem<'a, T> {
         Ok(Self { inner, together, mass })
     }
 
-    /// Shares what the host has written, once all ranks have.
+    /// Shares data written by the host, once all ranks have written them.
     fn shared(&self, result: Result<()>, out: &mut [T]) -> Result<()> {
         self.together.agree(result)?;
         self.together.share(out)
@@ -75,7 +76,7 @@ impl<T: Real> System<T> for AgreedSystem<'_, T> {
 
     fn potential_energy(&mut self, u: &[T]) -> Option<T> {
         let part = self.inner.potential_energy(u)?;
-        // (Ranks that cannot be reached leave no number; an energy that is not finite is refused where it counts.)
+        // If ranks cannot be reached the result is NaN; an energy that is not finite is rejected where it is used.
         Some(self.together.sum(Ok([part.value()])).map_or(T::nan(), |[sum]| T::of(sum)))
     }
 
@@ -103,7 +104,7 @@ impl<T: Real> System<T> for AgreedSystem<'_, T> {
     }
 
     fn commit(&mut self, t: f64, u: &[T], v: &[T]) -> Result<()> {
-        // No history moves while a rank may still fail.
+        // No history variables change while a rank may still fail.
         self.together.agree(Ok(()))?;
         let result = self.inner.commit(t, u, v);
         self.together.agree(result)

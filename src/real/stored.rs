@@ -1,9 +1,9 @@
-//! What a file of a run asks of its scalar: nothing, without the feature `serde`.
+//! Serialization of scalars for files of a run; no requirement without the feature `serde`.
 
-/// A scalar that can be written and read again.
+/// A scalar that can be serialized.
 #[cfg(feature = "serde")]
 pub trait Stored: serde::Serialize + serde::de::DeserializeOwned {
-    /// What files call it.
+    /// Its name in files.
     const NAME: &'static str;
 }
 

@@ -131,7 +131,7 @@ struct ModeStep<T> {
 #[derive(Debug)]
 struct Loads<'a, T> {
     function: Option<LoadFunction<'a, T>>,
-    /// On all dofs: the constant one, or that at the end of the step.
+    /// Load on all dofs: the constant one, or the one at the end of the step.
     values: Vec<T>,
 }
 
@@ -145,7 +145,7 @@ struct Contact<'a, T: Real> {
     delassus: Vec<T>,
     offset: Vec<T>,
     tolerance: Vec<T>,
-    /// Forces on all dofs, those of the step, and zeros for the dofs of the rows.
+    /// Contact forces of the step on all dofs, and a zero displacement for evaluating the gap offsets.
     forces: Vec<T>,
     at_rest: Vec<T>,
     solver: Box<dyn ContactSolver<T> + 'a>,
@@ -156,7 +156,7 @@ struct Contact<'a, T: Real> {
 struct Motion<T> {
     displacement: Vec<T>,
     velocity: Vec<T>,
-    /// What acts on the modes, and on the contact dofs, there with the contact forces.
+    /// Forces on modes and contact dofs, including contact forces.
     force: Vec<T>,
     multipliers: Vec<T>,
     gaps: Vec<T>,
@@ -169,28 +169,27 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
         Self { start, ..self }
     }
 
-    /// Displacements of all dofs at the start ([`ReducedBody::displacement`]); zero by default. Those of the contact
-    /// dofs follow from the modes, loads and contact.
+    /// Displacements of all dofs at the start ([`ReducedBody::displacement`]); zero by default. Contact dofs are computed
+    /// from the modes, loads and contact.
     #[must_use]
     pub fn displacement(self, displacement: Vec<T>) -> Self {
         Self { displacement: Some(displacement), ..self }
     }
 
-    /// Velocities of all dofs at the start ([`ReducedBody::velocity`]); zero by default. Those of the contact dofs
-    /// follow.
+    /// Velocities of all dofs at the start ([`ReducedBody::velocity`]); zero by default. Contact dofs are computed.
     #[must_use]
     pub fn velocity(self, velocity: Vec<T>) -> Self {
         Self { velocity: Some(velocity), ..self }
     }
 
-    /// The rows of contact, over contact dofs of the bodies: rigid and equality ones.
+    /// The contact rows, over contact dofs of the bodies; rigid or equality rows only.
     #[must_use]
     pub fn constraint(self, rows: LinearRows<'a, T>) -> Self {
         Self { rows, ..self }
     }
 
-    /// A load on all dofs that replaces the constant ones of the bodies: the closure writes it at t, into zeros. It is
-    /// taken as linear between the ends of a step, exactly if it is.
+    /// A load on all dofs that replaces the constant loads of the bodies: the closure writes the load at t into zeros. It
+    /// is interpolated linearly within a step.
     #[must_use]
     pub fn load(self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
         Self { load: Some(LoadFunction(Box::new(load))), ..self }
@@ -206,11 +205,11 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for a step size that is not positive and finite, and for one with ω_r h > π, of untapered
-    /// bodies π/4 (the product is given); [`Error::Empty`] without a body; [`Error::Incompatible`] for
-    /// [`Boundary::CraigBampton`], whose contact dofs have mass, for rows on other dofs, under other laws, with
-    /// friction or bonds, and for a solver that does not take them; [`Error::Dimension`] and [`Error::NotFinite`] for
-    /// displacements, velocities and loads; contact errors as of a [`step`](ModalPropagation::step).
+    /// [`Error::Parameter`] for a step size that is not positive and finite, and for one with ω_r h > π, for untapered
+    /// bodies π/4 (the error has the product); [`Error::Empty`] without a body; [`Error::Incompatible`] for
+    /// [`Boundary::CraigBampton`], whose contact dofs have mass, for rows on other dofs, with other laws, friction or
+    /// bonds, and for a solver that does not support the rows; [`Error::Dimension`] and [`Error::NotFinite`] for
+    /// displacements, velocities and loads; contact errors as in a [`step`](ModalPropagation::step).
     pub fn build(self) -> Result<ModalPropagation<'a, T>> {
         step_size::<T>(self.h)?;
         if self.bodies.is_empty() {
@@ -257,7 +256,7 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
 }
 
 impl<'a, T: Real> ModalPropagation<'a, T> {
-    /// Bodies side by side, in steps of h; see [`ModalPropagationBuilder`] for what else there is.
+    /// A builder for these bodies with step h; see [`ModalPropagationBuilder`] for the options.
     pub fn builder(bodies: &[&'a ReducedBody<T>], h: f64) -> ModalPropagationBuilder<'a, T> {
         ModalPropagationBuilder {
             bodies: bodies.to_vec(),

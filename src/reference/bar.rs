@@ -33,7 +33,7 @@ impl Bar {
         self.density * self.area * self.length
     }
 
-    /// Time a wave needs from one end to the other.
+    /// Travel time of a wave from one end to the other.
     pub(super) fn transit(&self) -> f64 {
         self.length / self.wave_speed()
     }
@@ -77,14 +77,14 @@ impl Steps {
         self.0.push(piece);
     }
 
-    /// Changes to `value` at `start`, unless the change is not larger than `tolerance`.
+    /// Changes to `value` at `start`, unless the change is at most `tolerance`.
     pub(super) fn jump(&mut self, start: f64, value: f64, tolerance: f64) {
         if (value - self.value(start)).abs() > tolerance {
             self.push(start, value, self.integral(start));
         }
     }
 
-    /// Index of the piece that holds at `t`: the last one that starts no later.
+    /// Index of the piece that contains `t`: the last one that starts at or before `t`.
     pub(super) fn index(&self, t: f64) -> usize {
         self.0[1..].partition_point(|piece| piece.start <= t)
     }
@@ -104,14 +104,14 @@ impl Steps {
     }
 }
 
-/// One of the two bodies and the invariant that has left its contact end, relative to the frame velocity.
+/// One of the two bodies, and the invariant that left its contact end, relative to the frame velocity.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     /// `None` for the wall.
     pub(super) bar: Option<Bar>,
     /// `1/Z`, zero for the wall.
     pub(super) compliance: f64,
-    /// `l/c`, infinite for the wall: nothing comes back.
+    /// `l/c`, infinite for the wall, where no wave returns.
     pub(super) transit: f64,
     pub(super) outgoing: Steps,
 }
@@ -128,8 +128,8 @@ impl Body {
 
     /// Integral of `f(outgoing, incoming)` over the transit time, that is over the bar, at the time `t`.
     ///
-    /// A wave travels `delay` from the contact end to the point where the outgoing invariant is the one that left at
-    /// `t - delay` and the incoming one is the one that left at `t + delay - 2 l/c`.
+    /// A wave takes `delay` from the contact end to a point. There the outgoing invariant is the one that left at `t
+    /// - delay`, and the incoming one is the one that left at `t + delay - 2 l/c`.
     pub(super) fn integrate(&self, t: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         let pieces = &self.outgoing.0;
         let entered = t - 2.0 * self.transit;

@@ -3,9 +3,10 @@
 /// A bar of unit section dropped from rest onto a wall, in the proportions of Doyen, Ern and Piperno (SIAM J. Sci.
 /// Comput. 33, 2011, where the solution is a series).
 ///
-/// There the flight between the two contacts of a period lasts three round trips of the waves. The bar then leaves the
-/// first contact, in which the force rises, with uniform speed and twice the strain of its weight, and returns in that
-/// state; the second contact is the first one in reverse, and after it the bar rises undeformed to where it came from.
+/// There the flight between the two contacts of a period lasts three round trips of the waves. The bar leaves the
+/// first contact, in which the force rises, with uniform speed and twice the strain of its weight, and returns in
+/// that state; the second contact is the first one in reverse, after which the bar rises undeformed to its initial
+/// height.
 ///
 /// ```
 /// use contact_dynamics::reference::BouncingBar;
@@ -70,7 +71,7 @@ impl BouncingBar {
         [fall, fall + contact, fall + contact + flight, fall + 2.0 * contact + flight]
     }
 
-    /// The motion repeats after this time.
+    /// Period of the motion.
     pub fn period(&self) -> f64 {
         self.events()[3] + self.events()[0]
     }
@@ -100,7 +101,7 @@ impl BouncingBar {
         } else if t < t2 || (t3..t4).contains(&t) {
             0.0
         } else if t < t3 {
-            // The bar leaves with a uniform speed and twice the strain of its weight.
+            // The bar leaves with uniform speed and twice the strain of its weight.
             let s = t - t2;
             let r = s.rem_euclid(2.0 * self.length / c);
             ballistic(s) + g * (r * r - 2.0 * self.length * r / c)
@@ -109,7 +110,7 @@ impl BouncingBar {
         }
     }
 
-    /// Total energy per section: elastic, kinetic and that of the height; constant in time.
+    /// Total energy per section: elastic, kinetic and gravitational; constant in time.
     pub fn energy(&self) -> f64 {
         self.density * self.length * self.gravity * self.drop
     }

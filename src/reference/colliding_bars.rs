@@ -3,11 +3,11 @@
 use super::bar::{Bar, Body, Steps};
 use super::error::{MAX_EVENTS, ReferenceError, finite, positive};
 
-/// Events closer than this fraction of the time scale are one event that rounding has split.
+/// Events closer than this fraction of the time scale are one event split by rounding.
 const SAME_TIME: f64 = 1e-12;
 /// Fraction of the impact speed below which two contact ends move together.
 const SAME_VELOCITY: f64 = 1e-12;
-/// Fraction of the impact speed below which a jump is rounding, not a wave.
+/// Fraction of the impact speed below which a jump is rounding and no wave.
 const NO_JUMP: f64 = 8.0 * f64::EPSILON;
 
 /// Which of the two colliding bodies.
@@ -22,25 +22,26 @@ pub enum Side {
 /// Exact solution of the central impact of two elastic bars, or of a bar and a rigid wall.
 ///
 /// The bars lie on one line, a distance `gap` apart at time zero, undeformed, each with its own uniform velocity.
-/// Their far ends are free. They may differ in everything: material, cross-section (plane cross-sections stay plane),
-/// length, velocity. Contact transmits compression only and does not stick. See the [module](super) for the theory.
+/// Their far ends are free. Material, cross-section (plane cross-sections stay plane), length and velocity may all
+/// differ. Contact transmits compression only and does not stick. See the [module](super) for the theory.
 ///
 /// - `x` is the material coordinate of a bar from its own left end, `0 <= x <= length`.
 /// - Displacements, velocities and momentum are positive to the right, stress is positive in tension, the contact
 ///   force and the gap are never negative.
-/// - Where a quantity jumps, the value is the one just after the jump. A time that misses a jump by rounding only
-///   (relative 1e-12) counts as after it.
-/// - A query with a time outside `[0, until]` or an `x` outside the bar answers NaN.
+/// - At a jump, the value is the one just after it. A time that misses a jump by rounding only (relative 1e-12)
+///   counts as after it.
+/// - A query with a time outside `[0, until]` or an `x` outside the bar returns NaN.
 /// - For the wall ([`Side::Right`] after [`against_wall`](Self::against_wall)) `x` is ignored, displacement and
-///   velocities are those of the wall, and the stress is zero. Energies and momentum count the bar alone.
-/// - Bars may touch without force, when their ends happen to move together. That counts as contact.
+///   velocities are the wall's, and the stress is zero. Energies and momentum include only the bar.
+/// - Bars may touch without force, if their ends happen to move together. That counts as contact.
 ///
-/// Queries allocate nothing and cost `O(log n)` for `n` jumps, energies `O(n)` at worst. The only error is rounding:
-/// a few `f64::EPSILON` for every wave transit up to `t`.
+/// Queries do not allocate and cost `O(log n)` for `n` jumps, energies at most `O(n)`. The only error is rounding: a
+/// few `f64::EPSILON` for every wave transit up to `t`.
 ///
 /// # Example
 ///
-/// Two equal bars meet head-on, stay together while the waves run to the far ends and back, and swap velocities.
+/// Two equal bars meet head-on, stay together while the waves travel to the far ends and back, and exchange
+/// velocities.
 ///
 /// ```
 /// use contact_dynamics::reference::{Bar, CollidingBars, Side};
@@ -59,8 +60,8 @@ pub enum Side {
 /// ```
 #[derive(Clone, Debug)]
 pub struct CollidingBars {
-    /// Velocity of the frame in which the invariants are stored, that of the contact after the first impact. Its
-    /// choice keeps rounding proportional to the impact speed, however fast the pair travels.
+    /// Velocity of the frame in which the invariants are stored: the velocity of the contact after the first impact.
+    /// It keeps rounding proportional to the impact speed, however fast the pair travels.
     frame: f64,
     until: f64,
     bodies: [Body; 2],
@@ -136,7 +137,8 @@ impl CollidingBars {
             let [from_left, from_right] = [0, 1].map(|i| self.bodies[i].outgoing.0[fronts[i] - 1].value);
             let closing = from_left - from_right;
             let touching = gap <= 0.0 && closing >= -SAME_VELOCITY * scale;
-            // The force that gives the ends one velocity. A rest of rounding size, of either sign, is no pressure.
+            // The force that gives the ends one velocity. A remainder of rounding size, of either sign, is no
+            // pressure.
             let bond = if touching { closing / compliance } else { 0.0 };
             let pressing = closing > SAME_VELOCITY * scale;
             let force = if pressing { bond } else { 0.0 };
@@ -271,7 +273,7 @@ impl CollidingBars {
         self.known(t, || self.opening.integral(t).max(0.0))
     }
 
-    /// Start and release times of the contacts, in order. A contact that outlasts the horizon ends there.
+    /// Start and release times of the contacts, in order. A contact that lasts beyond the horizon ends there.
     pub fn contact_intervals(&self) -> &[(f64, f64)] {
         &self.intervals
     }
@@ -309,7 +311,8 @@ impl CollidingBars {
         self.known(t, || self.mean(self.body(side), t))
     }
 
-    /// The mean over the bar of `(outgoing + incoming) / 2` is the mean of what went out during the last round trip.
+    /// The mean over the bar of `(outgoing + incoming) / 2` is the mean of the outgoing invariant over the last round
+    /// trip.
     fn mean(&self, body: &Body, t: f64) -> f64 {
         if body.bar.is_none() {
             return self.frame;
@@ -319,7 +322,7 @@ impl CollidingBars {
         self.frame + relative / round_trip
     }
 
-    /// Sum over the bars, the wall left out.
+    /// Sum over the bars, without the wall.
     fn sum(&self, t: f64, f: impl Fn(&Body, &Bar) -> f64) -> f64 {
         let bars = self.bodies.iter().filter_map(|body| body.bar.map(|bar| f(body, &bar)));
         self.known(t, || bars.sum())

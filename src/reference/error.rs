@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Events at the contact after which the solution is given up.
+/// Limit of events at the contact.
 pub(super) const MAX_EVENTS: usize = 200_000;
 
 /// Why a reference solution cannot be built.
@@ -17,7 +17,7 @@ pub enum ReferenceError {
         /// Its value.
         value: f64,
     },
-    /// More wave fronts than can be stored meet at the contact before the horizon.
+    /// More wave fronts than can be stored reach the contact before the horizon.
     TooManyEvents {
         /// Time reached.
         time: f64,

@@ -3,8 +3,8 @@
 /// Free response `[u, v, a]` at the time `t` of `u'' + 2 xi omega u' + omega² u = 0` from `u(0) = u0`, `u'(0) = v0`.
 ///
 /// `omega >= 0` is the undamped natural frequency in radians per unit of time and `xi >= 0` the damping ratio:
-/// underdamped below one, critically damped at one, overdamped above. The formula has no cancellation between the
-/// three. `omega = 0` gives uniform motion.
+/// underdamped below one, critically damped at one, overdamped above. The formula has no cancellation near one.
+/// `omega = 0` gives uniform motion.
 ///
 /// # Example
 ///
@@ -50,8 +50,8 @@ pub struct HarmonicForce {
 
 /// Response `[u, v, a]` at the time `t` of `u'' + 2 xi omega u' + omega² u = force(t)` from `u(0) = u0`, `u'(0) = v0`.
 ///
-/// It is the steady response plus the [free response](single_oscillator) to the rest of the initial values. Undamped
-/// resonance is solved exactly; next to it the two parts cancel, and the relative error grows as `f64::EPSILON omega /
+/// It is the steady response plus the [free response](single_oscillator) to the remaining initial values. Undamped
+/// resonance is solved exactly; near it the two parts cancel, and the relative error grows as `f64::EPSILON omega /
 /// |omega - frequency|`.
 ///
 /// # Example

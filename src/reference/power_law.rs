@@ -1,10 +1,10 @@
-//! Impact of a mass on a spring whose force is a power of its compression: Hertz' impact and the linear spring.
+//! Impact of a mass on a spring with a power-law force: Hertz' impact and the linear spring.
 
-/// A mass m that meets a spring F = k δ^p with speed v, and leaves it with the same speed.
+/// A mass m that hits a spring F = k δ^p with speed v, and leaves it with the same speed.
 ///
-/// Hertz' impact of two elastic spheres has p = 3/2, k = 4/3 E* √R, with m and R those of the pair (1/m = Σ 1/mᵢ). The
-/// duration is the integral of dδ/√(v² − 2k δ^{p+1}/((p+1) m)) there and back, in closed form with Euler's beta
-/// function.
+/// Hertz' impact of two elastic spheres has p = 3/2 and k = 4/3 E* √R, with the effective m and R of the pair (1/m =
+/// Σ 1/mᵢ). The duration is the integral of dδ/√(v² − 2k δ^{p+1}/((p+1) m)) there and back, in closed form with
+/// Euler's beta function.
 ///
 /// ```
 /// use contact_dynamics::reference::PowerLawImpact;

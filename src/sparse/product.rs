@@ -1,7 +1,7 @@
-//! How a matrix is multiplied with vectors, which its pattern tells once.
+//! The multiplication of a matrix with vectors, by a method selected once from its pattern.
 //!
-//! Of a symmetric matrix of dofs that come node by node, as nearly all do, only the entries from the diagonal down are
-//! read, and one index for a block of them (`benches/solids.rs` has what that brings).
+//! For a symmetric matrix whose dofs are numbered node by node, as usual, only the entries on and below the diagonal
+//! are read, with one index per block of them (`benches/solids.rs` measures the gain).
 
 use super::Symmetry;
 use crate::kernels::product::{LowerColumns, Supervariable, Tridiagonal};
@@ -11,16 +11,17 @@ use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// How a matrix is multiplied. The matrix itself stays where it is, and must be the one that this was made of.
+/// The multiplication method of a matrix. The matrix is stored elsewhere and must be the one for which this was
+/// created.
 #[derive(Debug)]
 pub(crate) enum Product<T> {
-    /// A matrix that is not symmetric: column by column.
+    /// An unsymmetric matrix: column by column.
     General,
-    /// A symmetric one without dofs that go together: row by row.
+    /// A symmetric matrix without groups of dofs: row by row.
     Rows,
-    /// A symmetric one with entries on and beside the diagonal only.
+    /// A symmetric tridiagonal matrix.
     Tridiagonal { diagonal: Vec<T>, beside: Vec<T> },
-    /// A symmetric one whose columns go together in twos and threes.
+    /// A symmetric matrix whose columns form groups of two or three.
     Supervariables(Supervariables<T>),
 }
 
@@ -76,11 +77,11 @@ impl<T: Real> Product<T> {
     }
 }
 
-/// The supervariables of a matrix, and the parts that several threads multiply side by side. Parts are a matter of the
-/// matrix alone, so that the result is the same by any number of threads.
+/// The supervariables of a matrix, and the parts that several threads multiply in parallel. Parts depend on the
+/// matrix only, so the result is the same for any number of threads.
 #[derive(Debug)]
 pub(crate) struct Supervariables<T> {
-    /// All of them, and one behind the last.
+    /// All supervariables, and one after the last.
     all: Vec<Supervariable>,
     groups: Vec<u32>,
     parts: Vec<Part<T>>,
@@ -89,26 +90,26 @@ pub(crate) struct Supervariables<T> {
 /// Columns that one thread multiplies.
 #[derive(Debug)]
 struct Part<T> {
-    /// Of the supervariables, without the one that follows.
+    /// Range of the supervariables, without the following one.
     supervariables: Range<usize>,
     columns: Range<usize>,
-    /// What they add to the product: in their own rows, then in those that follow. Empty if there is one part, which
-    /// writes to the product itself.
+    /// Their contributions to the product: in their own rows, then in later rows. Empty if there is a single part,
+    /// which writes to the product itself.
     sums: Vec<T>,
 }
 
 impl<T: Real> Supervariables<T> {
-    /// Columns together at most: a kernel is compiled for each number. (The six dofs of a shell's node are two of
-    /// them.)
+    /// Largest number of columns in a group: a kernel is compiled for each number. The six dofs of a shell's node
+    /// form two groups.
     const WIDEST: usize = 3;
-    /// Below so many columns a supervariable, on average, rows are as fast.
+    /// With fewer columns per supervariable, on average, rows are as fast.
     const WORTHWHILE: f64 = 1.5;
-    /// Entries for which a thread is worth its while: a tenth of a millisecond.
+    /// Number of entries that deserves a thread: a tenth of a millisecond.
     const GRAIN: usize = 1 << 18;
-    /// So many parts keep eight threads busy, and cost one little.
+    /// This many parts keep eight threads busy at little cost for one thread.
     const MOST_PARTS: usize = 8;
 
-    /// `None` if they would not pay, or if the matrix is too large for 32 bits.
+    /// `None` if they bring no gain, or if the matrix is too large for 32 bits.
     fn find(pattern: SymbolicSparseColMatRef<'_, usize>) -> Option<Self> {
         let n = pattern.ncols();
         u32::try_from(pattern.row_idx().len()).ok()?;
@@ -142,7 +143,7 @@ impl<T: Real> Supervariables<T> {
         Some(Self { all, groups, parts })
     }
 
-    /// Parts with as many entries each; one alone if they would add to many rows of each other.
+    /// Parts with similar numbers of entries; a single one if they would contribute to many rows of each other.
     fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, all: &[Supervariable]) -> Vec<Part<T>> {
         let n = pattern.ncols();
         let pointers = pattern.col_ptr();
@@ -207,7 +208,8 @@ mod tests {
     use super::*;
     use faer::sparse::{SparseColMat, Triplet};
 
-    /// Nodes with so many dofs each; two nodes are coupled if `coupled` says so, and all nodes with themselves.
+    /// Nodes with the given numbers of dofs; two nodes are coupled if `coupled` returns true, and each node with
+    /// itself.
     fn matrix(dofs: &[usize], coupled: impl Fn(usize, usize) -> bool) -> SparseColMat<usize, f64> {
         let first: Vec<usize> = std::iter::once(0)
             .chain(dofs.iter().scan(0, |sum, dofs| {
@@ -231,7 +233,7 @@ mod tests {
         SparseColMat::try_new_from_triplets(n, n, &entries).unwrap()
     }
 
-    /// Compares products with those row by row, to the rounding of the sums.
+    /// Compares products with row-by-row products, to the rounding of the sums.
     fn check(a: &SparseColMat<usize, f64>, product: &mut Product<f64>) {
         let a = a.as_ref();
         let n = a.ncols();
@@ -262,7 +264,7 @@ mod tests {
         }
     }
 
-    /// A node of two dofs between others of three leaves rows that come neither in twos nor in threes.
+    /// A node of two dofs between nodes of three gives rows in groups of neither two nor three.
     #[test]
     fn groups_of_rows_that_are_no_nodes() {
         let a = matrix(&[3, 2, 3], |_, q| q == 0);
@@ -287,7 +289,7 @@ mod tests {
         check(&net, &mut Product::new(net.as_ref(), Symmetry::General));
     }
 
-    /// Large matrices are multiplied in parts where dofs are numbered along the body, and in one where they are not.
+    /// Large matrices are multiplied in several parts if dofs are numbered along the body, otherwise in one.
     #[test]
     fn parts_of_a_large_matrix_add_up() {
         let band = |p: usize, q: usize| p - q < 14;

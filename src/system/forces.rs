@@ -1,8 +1,8 @@
-//! What a system may offer beside force and tangent: its damping force, and a force of its own along a path.
+//! Optional forces of a system: its damping force, and its own force along a path.
 
 use crate::error::Result;
 
-/// Weights of the tangent that a stage asks for: `stiffness · K + damping · C`.
+/// Weights of the tangent in a stage: `stiffness · K + damping · C`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TangentWeights<T> {
@@ -32,14 +32,14 @@ pub struct Path<'a, T> {
 }
 
 impl<'a, T> Path<'a, T> {
-    /// A path from one configuration to another; `mean` is ½ (from + to), which is not formed here.
+    /// A path from one configuration to another; `mean` must be ½ (from + to).
     pub const fn new(from: &'a [T], to: &'a [T], mean: &'a [T]) -> Self {
         Self { from, to, mean }
     }
 }
 
-/// The force of damping, of a [`System`](super::System) that has one
-/// ([`System::damping_force`](super::System::damping_force)).
+/// The damping force of a [`System`](super::System), returned by
+/// [`System::damping_force`](super::System::damping_force).
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -95,8 +95,8 @@ impl<'a, T> Path<'a, T> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait DampingForce<T> {
-    /// `out =` the part of the internal force that vanishes with v (C v if it is linear), `out` holding anything on
-    /// entry; [`force`](super::System::force) contains its negative.
+    /// `out =` the part of the internal force that vanishes with v (C v if linear); `out` is undefined on entry.
+    /// [`force`](super::System::force) contains its negative.
     ///
     /// # Errors
     ///
@@ -104,24 +104,23 @@ pub trait DampingForce<T> {
     fn evaluate(&mut self, u: &[T], v: &[T], out: &mut [T]) -> Result<()>;
 }
 
-/// A force of its own along a path, of a [`System`](super::System) that has one
-/// ([`System::path_force`](super::System::path_force)): its internal work is the change of the potential. Read by
+/// The force of a [`System`](super::System) along a path, returned by
+/// [`System::path_force`](super::System::path_force): its internal work is the change of the potential. Used by
 /// [`EnergyMomentum`](crate::EnergyMomentum).
 pub trait PathForce<T> {
-    /// `out = f` of a step along a path, with f_int · (to − from) = V(to) − V(from); t and v are those of the middle.
-    /// As in [`force`](super::System::force) the whole force is asked for: the external load at t, minus that internal
-    /// force, minus the damping force at the mean v.
-    /// For St. Venant–Kirchhoff materials it is the force of the mean stress ½ (S(from) + S(to)) on the mean
-    /// configuration, which conserves angular momentum too.
+    /// `out = f` of a step along a path, with f_int · (to − from) = V(to) − V(from); t and v are taken at the middle.
+    /// As in [`force`](super::System::force), `out` is the whole force: the external load at t, minus that internal
+    /// force, minus the damping force at the mean v. For St. Venant–Kirchhoff materials it is the force of the mean
+    /// stress ½ (S(from) + S(to)) on the mean configuration, which also conserves angular momentum.
     ///
     /// # Errors
     ///
     /// As [`force`](super::System::force).
     fn force_along(&mut self, t: f64, path: Path<'_, T>, v: &[T], out: &mut [T]) -> Result<()>;
 
-    /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to
-    /// −2 ∂f/∂to (which is the stiffness where f is linear): what is neglected costs iterations, not accuracy. The
-    /// [`tangent`](super::System::tangent) at `path.mean` will often do. The exact one is not symmetric and takes
+    /// `out = weights.stiffness K + weights.damping C` for [`force_along`](Self::force_along), with K close to −2
+    /// ∂f/∂to (the stiffness if f is linear): approximations cost iterations, not accuracy. The
+    /// [`tangent`](super::System::tangent) at `path.mean` is often sufficient. The exact K is unsymmetric and needs
     /// [`Lu`](crate::Lu); without it K must be symmetric. C is −∂f/∂v, as in the tangent.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Linear systems: constant M, C and K, a load of time, fixed and driven degrees of freedom.
+//! Linear systems: constant M, C and K, a time-dependent load, fixed and driven dofs.
 
 use super::{DampingForce, Linearity, System, TangentWeights};
 use crate::error::{Error, Result};
@@ -14,14 +14,14 @@ type Motion<'a, T> = Box<dyn FnMut(f64) -> Result<[T; 3]> + Send + 'a>;
 
 /// `M a + C v + K u = F(t) + Gᵀ λ` with constant M, C and K (both triangles stored), M symmetric.
 ///
-/// A mass matrix without entries off the diagonal is recognized as lumped. Without damping no damping product is
-/// formed.
+/// A mass matrix without off-diagonal entries is recognized as lumped. Without damping no damping product is
+/// computed.
 ///
-/// C (gyroscopic forces) and K (circulatory ones, loads that follow the motion) need not be symmetric; a scheme that
-/// has them in its effective matrix then takes [`Lu`](crate::Lu) as its linear solver, others refuse it by
-/// [`Error::Asymmetric`]. A K that is not symmetric has no potential: [`Energy::potential`](crate::Energy) is then
-/// none, and the work of K u is in the remainder of the energy balance. A gyroscopic C does no work, and the balance
-/// holds as with any other.
+/// C (gyroscopic forces) and K (circulatory forces, follower loads) may be unsymmetric. A scheme with them in its
+/// effective matrix then needs [`Lu`](crate::Lu) as its linear solver; other solvers reject them with
+/// [`Error::Asymmetric`]. An unsymmetric K has no potential: [`Energy::potential`](crate::Energy) is then none, and
+/// the work of K u is in the remainder of the energy balance. A gyroscopic C does no work and does not disturb the
+/// balance.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -46,7 +46,7 @@ pub struct LinearSystem<'a, T: Real> {
     /// How K is multiplied.
     product: Product<T>,
     damping: StoredDamping<T>,
-    /// K and a general C in one pattern; K's own pattern is enough without C.
+    /// K and a general C in one pattern; without C the pattern of K suffices.
     union: Option<Combination>,
     load: Option<Load<'a, T>>,
     prescribed: Vec<usize>,
@@ -85,10 +85,10 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an M that is not
-    /// symmetric and a K of one triangle (store a zero in the other one if that is meant), or [`Error::Mass`]
-    /// for a diagonal mass that is negative (zero is allowed: on dofs that are fixed or
-    /// driven, and elsewhere with schemes that take [dofs without mass](crate::analysis::massless_factor)).
+    /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an unsymmetric M
+    /// and for a K with entries in one triangle only (if intended, store a zero in the other one), [`Error::Mass`] for a
+    /// negative diagonal mass. Zero is allowed on fixed or driven dofs, and elsewhere with schemes that support
+    /// [dofs without mass](crate::analysis::massless_factor).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
         sparse::check_symmetric("mass", mass.as_ref())?;
         let n = mass.nrows();
@@ -106,7 +106,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         }
     }
 
-    /// A system with lumped masses, one a dof.
+    /// A system with lumped masses, one per dof.
     ///
     /// # Errors
     ///
@@ -146,7 +146,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         })
     }
 
-    /// Damping by a matrix C; replaces damping given before.
+    /// Damping by a matrix C; replaces earlier damping.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         Ok(self)
     }
 
-    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s); replaces damping given before.
+    /// Rayleigh damping C = `mass` M + `stiffness` K (units 1/s and s); replaces earlier damping.
     ///
     /// # Errors
     ///
@@ -189,8 +189,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         Ok(self)
     }
 
-    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces a load
-    /// given before.
+    /// The external load F(t): the closure adds to (or sets entries of) a vector that is zero on entry. Replaces an
+    /// earlier load.
     #[must_use]
     pub fn load(self, mut load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
         self.try_load(move |t, out| {
@@ -199,7 +199,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         })
     }
 
-    /// The external load F(t) of a closure that may fail, as [`load`](Self::load) otherwise. Its error
+    /// The external load F(t) of a closure that may fail, otherwise as [`load`](Self::load). Its error
     /// ([`Error::Host`], or [`Error::Inadmissible`] if a smaller step may help) undoes the step.
     ///
     /// ```
@@ -225,8 +225,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         self
     }
 
-    /// Says that this is the part of a system that one of several ranks has: the matrices of the elements that touch
-    /// its own dofs, over all dofs that it knows. See [`Ranks`] for what each rank has.
+    /// Marks this as one rank's part of a system: the matrices of the elements that touch its own dofs, over all dofs
+    /// that it has. [`Ranks`] describes the data of each rank.
     #[must_use]
     pub fn over_ranks(mut self, ranks: Arc<dyn Ranks<T>>) -> Self {
         self.ranks = Some(ranks);
@@ -242,8 +242,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         self.prescribe(dof, None)
     }
 
-    /// Drives a dof: the closure gives displacement, velocity and acceleration at t. They must be derivatives of each
-    /// other.
+    /// Drives a dof: the closure returns displacement, velocity and acceleration at t, which must be derivatives of
+    /// each other.
     ///
     /// # Errors
     ///
@@ -252,7 +252,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
         self.try_drive(dof, move |t| Ok(motion(t)))
     }
 
-    /// Drives a dof by a closure that may fail, as [`drive`](Self::drive) otherwise. Its error ([`Error::Host`], or
+    /// Drives a dof by a closure that may fail, otherwise as [`drive`](Self::drive). Its error ([`Error::Host`], or
     /// [`Error::Inadmissible`] if a smaller step may help) undoes the step.
     ///
     /// # Errors
@@ -283,8 +283,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     }
 }
 
-/// Refuses negative masses and those that are not finite. (Zero masses are refused when a simulation is built, if the
-/// scheme does not admit them.)
+/// Rejects negative masses and those that are not finite. Building a simulation rejects zero masses if the scheme
+/// does not admit them.
 fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
     match mass.iter().position(|&m| !(m >= T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),
@@ -324,7 +324,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
     fn force(&mut self, t: f64, u: &[T], v: &[T], out: &mut [T]) -> Result<()> {
         let minus = -T::one();
         if let StoredDamping::Rayleigh { stiffness, .. } = &self.damping {
-            // One product with K serves both: K (u + βv).
+            // One product with K gives both: K (u + βv).
             self.scratch.copy_from_slice(u);
             T::axpy(*stiffness, v, &mut self.scratch);
         }
@@ -383,7 +383,7 @@ impl<T: Real> System<T> for LinearSystem<'_, T> {
             let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
             u[j] * entries.map(|(&i, &value)| value * u[i]).sum::<T>()
         };
-        // (On ranks: the part of the rows that this one owns.)
+        // On ranks: only the owned rows.
         Some(T::of(0.5) * together.owned(u.len()).map(|part| part.map(energy).sum::<T>()).sum::<T>())
     }
 

@@ -1,17 +1,17 @@
-//! A number that tells the rows of schemes apart.
+//! A number that distinguishes the rows of schemes.
 
 use super::{ContactLevel, Stage, StageForce, Tableau};
 
 impl Tableau {
-    /// A hash of all coefficients, rounded to single precision: the same rows, computed in another order, have the same
-    /// one.
+    /// A hash of all coefficients, rounded to single precision: the same rows computed in another order give the same
+    /// hash.
     pub(crate) fn fingerprint(&self) -> u32 {
         // FNV-1a.
         const OFFSET: u32 = 0x811c_9dc5;
         const PRIME: u32 = 0x0100_0193;
         let mut hash = OFFSET;
         for number in self.stages.iter().flat_map(numbers) {
-            // The sum makes −0 the same as 0.
+            // The sum maps −0 to 0.
             #[expect(clippy::cast_possible_truncation, reason = "the rounding is meant")]
             let rounded = number as f32 + 0.0;
             for byte in rounded.to_le_bytes() {
@@ -22,7 +22,7 @@ impl Tableau {
     }
 }
 
-/// All that makes a stage.
+/// All data of a stage.
 fn numbers(stage: &Stage) -> Vec<f64> {
     let force = match stage.force {
         StageForce::AtBalance => 0.0,

@@ -6,7 +6,8 @@ use crate::error::Result;
 /// Weights of motion without stiffness and damping.
 const RIGID: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// The linear functional of the past that is the momentum of a scheme, and what each stage's multiplier adds to it.
+/// The linear functional of the past that is the momentum of a scheme, and the contribution of each stage's
+/// multiplier.
 ///
 /// ψ is the left eigenvector for the eigenvalue 1 of the step at K = C = 0, scaled so that free flight with velocity V
 /// gives V: momentum = 1ᵀ M ψ·(past)/h. A raw multiplier λ of stage s changes it by `h β_s λ`; an edit of the state or
@@ -48,7 +49,7 @@ impl Momentum {
             *p /= flight;
         }
 
-        // Pull back through the stages, last to first. After the last stage the intermediate states are not kept.
+        // Pull back through the stages, last to first. Intermediate states are dropped after the last stage.
         let mut covector: Vec<[f64; 3]> = psi.chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
         covector.splice(1..1, std::iter::repeat_n([0.0; 3], stages - 1));
         covector.push([0.0; 3]); // the oldest state leaves the past
@@ -84,8 +85,8 @@ impl Momentum {
         kept
     }
 
-    /// The covectors while the past is still being built by steps of `start` (one stage): entry m − 1 is the one for m
-    /// known states. Steps of the start conserve them in turn, and the last one is [`after_step`](Self::after_step).
+    /// The covectors while `start` (one stage) builds up the past: entry m − 1 is the one for m known states. Steps
+    /// of `start` conserve them in turn, and the last one is [`after_step`](Self::after_step).
     pub(crate) fn during_start(&self, start: &Stage) -> Vec<Vec<[f64; 3]>> {
         let mut covectors = vec![self.after_step()];
         while covectors[covectors.len() - 1].len() > 1 {
@@ -101,13 +102,13 @@ impl Momentum {
     }
 }
 
-/// β of a stage with this [`response`](Stage::response), and with this covector when it is done: a raw multiplier λ
-/// changes the momentum by h β λ.
+/// β of a stage with this [`response`](Stage::response) and the covector after it: a raw multiplier λ changes the
+/// momentum by h β λ.
 pub(crate) fn impulse_weight(response: [f64; 3], covector: &[[f64; 3]]) -> f64 {
     response.iter().zip(covector[0]).map(|(change, psi)| change * psi).sum()
 }
 
-/// The covector before a stage that has the covector `after` when it is done.
+/// The covector before a stage, from the covector `after` it.
 fn pull_back(after: &[[f64; 3]], stage: &Stage) -> Vec<[f64; 3]> {
     let width = after.len() - 1;
     let map = Tableau::stage_map(stage, RIGID, width);

@@ -27,7 +27,7 @@ pub struct Row {
     pub a: [f64; MAX_PAST],
 }
 
-/// The row that is the unknown itself.
+/// The row of the unknown itself.
 pub const Z: Row = Row { z: 1.0, u: [0.0; MAX_PAST], v: [0.0; MAX_PAST], a: [0.0; MAX_PAST] };
 /// The rows of the past displacements, newest first.
 pub const U: [Row; MAX_PAST] = past(0);
@@ -66,7 +66,7 @@ impl Row {
         }
     }
 
-    /// One more than the oldest past state read, 0 if none is.
+    /// One more than the index of the oldest past state read, 0 if none is read.
     pub fn depth(&self) -> usize {
         (0..MAX_PAST).rev().find(|&k| self.past(k).iter().any(|&c| c != 0.0)).map_or(0, |k| k + 1)
     }
@@ -75,7 +75,8 @@ impl Row {
         self.z.is_finite() && (0..MAX_PAST).all(|k| self.past(k).iter().all(|c| c.is_finite()))
     }
 
-    /// The row with its z expressed by d = z − ẑ, where ẑ makes `zero` vanish; terms that cancel to rounding are zero.
+    /// The row with its z expressed by d = z − ẑ, where ẑ makes `zero` vanish; terms that cancel to rounding become
+    /// zero.
     fn increment(self, zero: Self) -> Self {
         let factor = self.z / zero.z;
         let cancel = |x: f64, y: f64| {

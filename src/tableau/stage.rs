@@ -2,24 +2,24 @@
 
 use super::{Row, Rows};
 
-/// At which level, and where, a stage imposes contact.
+/// The level and time at which a stage imposes contact.
 ///
-/// `lead` is the fraction of the step by which the contact condition looks ahead of the stage's state, reached with the
-/// acceleration of that state: u + lead h v + ½ lead² h² a, and v + lead h a. Explicit schemes need it: the unknown
-/// multiplier of theirs moves the body only later.
+/// `lead` is the fraction of the step by which the contact condition is ahead of the stage's state, extrapolated with
+/// the acceleration of that state: u + lead h v + ½ lead² h² a, and v + lead h a. Explicit schemes need it, because
+/// their unknown multiplier moves the body only later.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ContactLevel {
     /// 0 ≤ g ⊥ λ ≥ 0 on displacements.
     Position {
-        /// How far ahead of the stage's state.
+        /// Lead over the stage's state.
         lead: f64,
     },
     /// 0 ≤ ġ ⊥ λ ≥ 0 on velocities, for contacts whose gap is forecast to be closed.
     Velocity {
-        /// How far ahead of the stage's state.
+        /// Lead over the stage's state.
         lead: f64,
-        /// Displacements at which the forecast takes the gap; a row without the unknown.
+        /// Displacements at which the forecast evaluates the gap; a row without the unknown.
         forecast: Row,
         /// Time of the forecast, as a fraction of the step.
         forecast_at: f64,
@@ -30,7 +30,7 @@ impl ContactLevel {
     /// Positions of the stage's own state.
     pub const POSITION: Self = Self::Position { lead: 0.0 };
 
-    /// How far ahead of the stage's state, as a fraction of the step.
+    /// Lead over the stage's state, as a fraction of the step.
     pub fn lead(&self) -> f64 {
         match *self {
             Self::Position { lead } | Self::Velocity { lead, .. } => lead,
@@ -38,15 +38,15 @@ impl ContactLevel {
     }
 }
 
-/// Which force of a nonlinear system a stage balances. For linear systems there is no difference.
+/// The force of a nonlinear system in the balance of a stage. For linear systems both are the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StageForce {
     /// f(t̄, ū, v̄).
     #[default]
     AtBalance,
-    /// The force whose internal work from the last state to that of the stage is the change of the potential; ū must be
-    /// the mean of the two.
+    /// The force whose internal work from the last state to the state of the stage equals the change of the
+    /// potential; ū must be the mean of both.
     AlongPath,
 }
 
@@ -58,13 +58,13 @@ pub struct Stage {
     pub recovery: Rows,
     /// Rows at which the balance of momentum holds.
     pub balance: Rows,
-    /// Fraction of the step at which external load and multiplier live.
+    /// Time of external load and multiplier, as a fraction of the step.
     pub load: f64,
-    /// Fraction of the step at which the stage's state (and its gap) lives.
+    /// Time of the stage's state and its gap, as a fraction of the step.
     pub end: f64,
-    /// Where contact is imposed.
+    /// Level and time at which contact is imposed.
     pub contact: ContactLevel,
-    /// Which force is balanced.
+    /// The force in the balance.
     pub force: StageForce,
 }
 
@@ -87,13 +87,13 @@ impl Stage {
         Self { end, load: end, ..self }
     }
 
-    /// The same stage with contact imposed at another level or place.
+    /// The same stage with contact imposed at another level or time.
     #[must_use]
     pub fn with_contact(self, contact: ContactLevel) -> Self {
         Self { contact, ..self }
     }
 
-    /// The same stage with the force of the path instead of that at the balance.
+    /// The same stage with the path force instead of the force at the balance.
     #[must_use]
     pub fn along_path(self) -> Self {
         Self { force: StageForce::AlongPath, ..self }
@@ -108,12 +108,12 @@ impl Stage {
         }
     }
 
-    /// Fraction of the step at which contact is imposed.
+    /// Time at which contact is imposed, as a fraction of the step.
     pub fn contact_at(&self) -> f64 {
         self.end + self.contact.lead()
     }
 
-    /// Everything the stage reads: recovery, balance and forecast.
+    /// All rows that the stage reads: recovery, balance and forecast.
     pub(super) fn rows(&self) -> Vec<Row> {
         let forecast = match self.contact {
             ContactLevel::Position { .. } => None,
@@ -127,15 +127,15 @@ impl Stage {
         self.balance == self.recovery
     }
 
-    /// Change of (U, V, A) of the stage by a unit multiplier on a unit mass, in units of h². The balance asks for w_ā
-    /// of the unknown, so a multiplier moves the rows by their weights over that of the balance's acceleration.
+    /// Change of (U, V, A) of the stage by a unit multiplier on a unit mass, in units of h². The balance contains w_ā
+    /// times the unknown, so a multiplier moves each row by its weight divided by w_ā.
     pub(crate) fn response(&self) -> [f64; 3] {
         self.recovery.each().map(|row| row.z / self.balance.a.z)
     }
 
     /// Rows over the increment d = z − ẑ instead of z, with ẑ the value for which the acceleration row vanishes.
     ///
-    /// Recovering a by subtracting displacements costs eps u/h²; in this form the terms that cancel are gone.
+    /// Recovering a by subtracting displacements has an error of eps u/h²; this form has no cancelling terms.
     #[must_use]
     pub fn increment(&self) -> Self {
         let zero = self.recovery.a;

@@ -1,51 +1,52 @@
-//! The rows of a constraint against differences of its gaps.
+//! Compares the rows of a constraint with differences of its gaps.
 
 use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::state::resolution;
 
-/// How far the rows of a constraint are from the derivatives of its gaps.
+/// Errors of the rows of a constraint as derivatives of its gaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GapJacobianError {
     /// Rows compared.
     pub rows: usize,
-    /// Largest difference between an entry of G and the derivative of the gap: a number, weights being of order one.
+    /// Largest difference between an entry of G and the derivative of the gap (dimensionless; weights are of order
+    /// one).
     pub jacobian: f64,
-    /// The contact (feature, candidate) and the dof of the system of that entry.
+    /// The contact (feature, candidate) and the system's dof of that entry.
     pub worst: ((usize, usize), usize),
-    /// Largest difference between a rate ∂g/∂t and the derivative of the gap (length/time); zero, as the next, if the
-    /// constraint leaves its rates to differences.
+    /// Largest difference between a rate ∂g/∂t and the derivative of the gap (length/time); zero, like
+    /// `acceleration`, if the constraint leaves its rates to differences.
     pub rate: f64,
-    /// Largest difference between the part of g̈ that comes from moving with v and its difference quotient
-    /// (length/time²); zero if v is.
+    /// Largest difference between the part of g̈ due to motion with v and its difference quotient (length/time²);
+    /// zero if v is.
     pub acceleration: f64,
-    /// How far the tangents of contacts with friction are from orthonormal rows, orthogonal to that of the gap and as
-    /// long as it: the largest product of two rows over their lengths, or difference of a length from that of the gap's
-    /// row over the latter. μ belongs to such tangents, and the cone over them is round.
+    /// Deviation of the tangents of contacts with friction from rows that are orthogonal to each other and to the gap
+    /// row, and as long as it: the largest product of two rows over their lengths, or relative difference of a length
+    /// from the length of the gap row. Only with such tangents is μ correct and the friction cone round.
     pub tangents: f64,
-    /// Rows that some displacement made vanish, compared as far as they were there.
+    /// Rows that vanished for some displacement; compared only while they existed.
     pub rows_lost: usize,
-    /// Searches that said [`Candidates::Unchanged`] though identities or G had changed: a run would go on with the old
-    /// rows.
+    /// Searches that returned [`Candidates::Unchanged`] although identities or G had changed: a run would continue
+    /// with the old rows.
     pub unreported: usize,
 }
 
 /// Compares G and the gap rates of a constraint with central differences of its gap.
 ///
-/// The gap is that after a [`search`](ContactConstraint::search) at the displaced position, so the check sees what the
-/// rows are linearized from, not only the rows themselves. `step` is the size of the displacements (length): small
-/// against what changes the geometry, large against its rounding, for instance 1e-6 of an element. Rows that a
-/// displacement makes appear or vanish are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out, searches
-/// that keep silent about rows that have changed in [`unreported`](GapJacobianError::unreported); at edges and kinks
-/// the gap has no derivative, so check at positions that are inside of facets. Time is varied by `step` over the
-/// largest speed in `v`, without another search; for the acceleration everything moves with v, by a hundred steps. The
-/// constraint is left as after a search at (t, u, v).
+/// The gap is evaluated after a [`search`](ContactConstraint::search) at the displaced position, so the check
+/// includes the geometry that is linearized, not only the rows. `step` is the size of the displacements (length):
+/// small compared with the geometry, large compared with its rounding, for instance 1e-6 of an element. Rows that
+/// appear or vanish by a displacement are counted in [`rows_lost`](GapJacobianError::rows_lost) and left out,
+/// unreported changes of rows in [`unreported`](GapJacobianError::unreported). At edges and kinks the gap has no
+/// derivative, so check at positions inside of facets. Time is varied by `step` over the largest speed in `v`,
+/// without another search; for the acceleration everything moves with v, by a hundred steps. The constraint is left
+/// as after a search at (t, u, v).
 ///
 /// # Errors
 ///
-/// Those of the constraint, and [`Error::MissingContactDof`] for dofs that u and v do not have.
+/// The errors of the constraint, and [`Error::MissingContactDof`] for dofs that u and v do not have.
 ///
 /// ```
 /// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
@@ -90,10 +91,10 @@ pub fn gap_jacobian<T: Real>(
         unreported: 0,
     };
     let mut lost = vec![false; rows];
-    // Rates first, while the rows are those of the search at u.
+    // Rates first, while the rows belong to the search at u.
     let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
     let delay = if speed > 0.0 { step / speed } else { step };
-    // Rounded to what times near t can resolve, so that t ± delay and t ± 100 delay are off by just that.
+    // Rounded to the resolution of times near t, so that t ± delay and t ± 100 delay are exact.
     let delay = (t + delay.max(resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
@@ -159,7 +160,7 @@ pub fn gap_jacobian<T: Real>(
     Ok(error)
 }
 
-/// How far the tangents of a contact with friction are from orthonormal ones.
+/// Deviation of the tangents of a contact with friction from orthonormal ones.
 fn skewness<T: Real>(contacts: &Contacts<T>, contact: usize) -> f64 {
     if contacts.friction(contact) == 0.0 {
         return 0.0;
@@ -178,11 +179,11 @@ fn skewness<T: Real>(contacts: &Contacts<T>, contact: usize) -> f64 {
     skew.chain((1..rows.len()).map(|i| (length(i) / length(0) - 1.0).abs())).fold(0.0, f64::max)
 }
 
-/// A constraint, and what its last search has found.
+/// A constraint, and the result of its last search.
 struct Watched<'c, T: Real> {
     constraint: &'c mut dyn ContactConstraint<T>,
     contacts: Option<Contacts<T>>,
-    /// Searches that changed rows and said that nothing has changed.
+    /// Searches that changed rows and returned `Unchanged`.
     unreported: usize,
 }
 
@@ -197,7 +198,7 @@ impl<T: Real> Watched<'_, T> {
     }
 }
 
-/// The gaps of some contacts after a search, as far as they are found.
+/// The gaps of some contacts after a search, if they are found.
 fn gaps_of<T: Real>(
     watched: &mut Watched<'_, T>,
     ids: &[(usize, usize)],

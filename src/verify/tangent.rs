@@ -1,10 +1,10 @@
-//! Tangent, damping force and potential of a system against differences of its force.
+//! Compares tangent, damping force and potential of a system with differences of its force.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::system::{self, System, TangentWeights};
 
-/// How far the parts of a system are from the derivatives of its force.
+/// Errors of the parts of a system as derivatives of its force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct TangentError {
@@ -15,13 +15,13 @@ pub struct TangentError {
     /// [`damping_force`](System::damping_force) (zero if there is none) against f(t, u, 0) − f(t, u, v).
     pub damping_force: ForceMismatch,
     /// Derivatives of [`potential_energy`](System::potential_energy) against the internal force at rest,
-    /// [`external_load`](System::external_load) − f(t, u, 0); a load that `external_load` forgets is found here too.
-    /// None without potential.
+    /// [`external_load`](System::external_load) − f(t, u, 0); also detects a load missing in `external_load`. `None`
+    /// without potential.
     pub potential: Option<ForceMismatch>,
 }
 
 impl TangentError {
-    /// The largest of all relative errors and asymmetries; NaN if one of them is.
+    /// The largest of all relative errors and asymmetries; NaN if one is NaN.
     pub fn largest(&self) -> f64 {
         let [k, c] = [self.stiffness, self.damping];
         let potential = self.potential.map_or(0.0, |potential| potential.relative);
@@ -30,23 +30,23 @@ impl TangentError {
     }
 }
 
-/// A matrix compared with difference quotients of the force, entries outside of the pattern included.
+/// A matrix compared with difference quotients of the force, including entries outside of the pattern.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MatrixMismatch {
-    /// Largest difference of an entry over the largest entry of both matrices; NaN if an entry is not finite.
+    /// Largest difference of an entry relative to the largest entry of both matrices; NaN if an entry is not finite.
     pub relative: f64,
     /// Row of the entry with the largest difference.
     pub row: usize,
     /// Its column.
     pub column: usize,
-    /// What the tangent holds there; zero outside of the pattern.
+    /// The entry of the tangent there; zero outside of the pattern.
     pub given: f64,
     /// The difference quotient there.
     pub expected: f64,
     /// Whether the pattern has the entry.
     pub in_pattern: bool,
-    /// Largest difference of two entries across the diagonal of the tangent, over the same scale.
+    /// Largest difference of two entries across the diagonal of the tangent, relative to the same scale.
     pub asymmetry: f64,
 }
 
@@ -54,31 +54,31 @@ pub struct MatrixMismatch {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ForceMismatch {
-    /// Largest difference over the largest entry of both vectors; NaN if an entry is not finite.
+    /// Largest difference relative to the largest entry of both vectors; NaN if an entry is not finite.
     pub relative: f64,
     /// The dof of that difference.
     pub dof: usize,
-    /// What the host gives there.
+    /// The host's value there.
     pub given: f64,
-    /// What follows from its force.
+    /// The value computed from its force.
     pub expected: f64,
 }
 
 /// Compares K and C of a system with central differences of its force at (t, u, v), and its damping force and potential
 /// with the force.
 ///
-/// Every dof is varied, prescribed ones too, by `step` (length) in u and by `velocity_step` in v. A quotient is wrong
-/// by about step² times the third derivative of the force and by ε |f| / step, so take 1e-5 to 1e-6 (`f32`: 1e-2 to
-/// 1e-3) of what changes the force: of an element in u, and of the speeds that matter in v. Check at a state that is
-/// deformed and moves: much of a wrong tangent vanishes at rest. Outputs hold NaN before each call, so entries that are
-/// not written are found. Costs 4 n forces, 2 n energies and n² comparisons for n dofs: meant for small meshes.
+/// Every dof is varied, including prescribed ones, by `step` (length) in u and by `velocity_step` in v. The error of
+/// a quotient is about step² times the third derivative of the force plus ε |f| / step, so use 1e-5 to 1e-6 (`f32`:
+/// 1e-2 to 1e-3) of the relevant scale: of an element in u, and of typical speeds in v. Check at a deformed, moving
+/// state: many errors of a tangent vanish at rest. Outputs hold NaN before each call, so unwritten entries are
+/// detected. Costs 4 n forces, 2 n energies and n² comparisons for n dofs: meant for small meshes.
 ///
 /// # Errors
 ///
 /// [`Error::Empty`] without dofs; [`Error::Dimension`] if u, v, the mass or the pattern do not have the size of the
 /// system; [`Error::Incompatible`] for a pattern out of order; [`Error::Asymmetric`] and [`Error::MatrixNotFinite`] for
 /// the mass; [`Error::NotFinite`] for u and v; [`Error::Parameter`] for steps that are not positive or too small to
-/// change u or v; and those of the system.
+/// change u or v; and the errors of the system.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
@@ -165,7 +165,7 @@ pub fn tangent<T: Real>(
         let gradient = varied.gradient(|u| system.potential_energy(u).unwrap_or_else(T::nan))?;
         out.fill(T::nan());
         system.external_load(t, &mut out)?;
-        // At rest both forces are rounding: what a step changes is the least scale.
+        // At rest both forces are rounding: the change over a step is the smallest scale.
         let mut worst = Worst { scale: largest * step, found: None };
         for (dof, gradient) in gradient.into_iter().enumerate() {
             worst.compare((dof, 0), gradient, out[dof] - still[dof]);
@@ -183,7 +183,7 @@ struct Varied<'a, T> {
 }
 
 impl<T: Real> Varied<'_, T> {
-    /// Calls `visit` with each dof, the vector displaced both ways (−1, +1) there, and the distance of the two.
+    /// Calls `visit` with each dof, the vector displaced there in both directions (−, +), and the distance of the two.
     fn each(&self, mut visit: impl FnMut(usize, [&[T]; 2], T) -> Result<()>) -> Result<()> {
         let refuse = |range| Err(Error::Parameter { name: self.name, value: self.step, range });
         if !(self.step > 0.0 && self.step.is_finite()) {
@@ -273,7 +273,7 @@ impl<T: Real> Matrix<T> {
     }
 }
 
-/// The largest difference met, and the largest entry.
+/// The largest difference found, and the largest entry.
 #[derive(Default)]
 struct Worst {
     scale: f64,

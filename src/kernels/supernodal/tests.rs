@@ -1,4 +1,4 @@
-//! Factors beside those of faer: random forests, dense blocks with several tiles, pivots that fail.
+//! Factors compared with those of faer: random forests, dense blocks with several tiles, failing pivots.
 
 use super::*;
 use faer::Side;
@@ -11,7 +11,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMat, Triplet};
 
-/// Numbers in [0, 1) that look random.
+/// Pseudo-random numbers in [0, 1).
 struct Numbers(u64);
 
 impl Numbers {
@@ -30,7 +30,7 @@ impl Numbers {
     }
 }
 
-/// A positive definite matrix with these entries below the diagonal, `shift` in the diagonal beyond dominance.
+/// A positive definite matrix with these entries below the diagonal; its diagonal exceeds dominance by `shift`.
 fn matrix(n: usize, below: &[(usize, usize)], shift: f64) -> SparseColMat<usize, f64> {
     let mut numbers = Numbers(n as u64);
     let mut diagonal = vec![shift; n];
@@ -51,7 +51,7 @@ fn analyzed(a: &SparseColMat<usize, f64>, ordering: SymmetricOrdering<'_, usize>
     factorize_symbolic_cholesky(a.symbolic(), Side::Lower, ordering, parameters).unwrap()
 }
 
-/// Values and pivots of ours.
+/// Values and pivots of this crate.
 fn ours(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Result<(Vec<f64>, Vec<f64>), usize> {
     let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { panic!("a supernodal factor") };
     let n = a.ncols();
@@ -63,7 +63,7 @@ fn ours(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Res
     factorize(&problem, &mut values, &mut pivots).map(|()| (values, pivots))
 }
 
-/// Values of faer, or the dof of the pivot that fails.
+/// Values of faer, or the dof of the failing pivot.
 fn faers(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Result<Vec<f64>, usize> {
     let mut values = vec![0.0; symbolic.len_val()];
     let (seq, spec) = (Par::Seq, Spec::default());
@@ -76,7 +76,7 @@ fn faers(symbolic: &SymbolicCholesky<usize>, a: &SparseColMat<usize, f64>) -> Re
 }
 
 fn check(a: &SparseColMat<usize, f64>, symbolic: &SymbolicCholesky<usize>) {
-    // (A diagonal matrix has a simplicial factor.)
+    // A diagonal matrix has a simplicial factor.
     if matches!(symbolic.raw(), SymbolicCholeskyRaw::Simplicial(_)) {
         return assert_eq!(symbolic.len_val(), a.ncols());
     }
@@ -95,7 +95,7 @@ fn factors_of_random_matrices_are_those_of_faer() {
     for n in [1, 2, 3, 7, 20, 61, 150, 400] {
         for density in [0, 1, 4, 12] {
             let count = n * density / 2;
-            // Half of the entries reach far, the others not: forests with several trees, wide and narrow supernodes.
+            // Half of the entries are far from the diagonal: forests with several trees, wide and narrow supernodes.
             let mut below: Vec<_> = (0..count)
                 .map(|k| {
                     let i = numbers.below(n);
@@ -114,11 +114,11 @@ fn factors_of_random_matrices_are_those_of_faer() {
 }
 
 /// Two dense blocks that only a third one connects, in this order: supernodes with several tiles, panels, chunks of
-/// rows and slabs, whose updates come from two branches.
+/// rows and slabs, updated from two branches.
 fn blocks(sizes: [usize; 3]) -> SparseColMat<usize, f64> {
     let n: usize = sizes.iter().sum();
     let block = |i: usize| usize::from(i >= sizes[0]) + usize::from(i >= sizes[0] + sizes[1]);
-    // Each is coupled with two thirds of the third one, so that they are supernodes of their own.
+    // Each is coupled with two thirds of the third one, so that they are separate supernodes.
     let (third, part) = (sizes[0] + sizes[1], sizes[2] / 3);
     let coupled = |i: usize, j: usize| match (block(i), block(j)) {
         (2, 0) => i < third + 2 * part,
@@ -148,7 +148,7 @@ fn factors_with_several_tiles_are_those_of_faer() {
     );
 }
 
-/// The pivot that fails first in the order of elimination is named, whichever branch meets one first.
+/// The error names the first failing pivot in the order of elimination, whichever branch finds one first.
 #[test]
 fn pivots_that_fail_are_those_of_faer() {
     let a = blocks([300, 280, 330]);

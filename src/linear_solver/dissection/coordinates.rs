@@ -3,7 +3,8 @@
 use super::separator::{BETWEEN, Separator};
 use crate::linear_solver::graph::{Graph, number};
 
-/// Side 0 are the vertices below the median of the longest axis; those above with a neighbor below separate.
+/// Side 0 has the vertices below the median of the longest axis; vertices above with a neighbor below form the
+/// separator.
 pub(super) fn bisect(graph: &Graph, places: &[[f64; 3]]) -> Separator {
     let extent = |axis: usize| {
         let along = places.iter().map(|place| place[axis]);

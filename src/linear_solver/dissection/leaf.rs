@@ -1,13 +1,13 @@
-//! Minimum degree of small parts of a graph, by sets of bits.
+//! Minimum degree of small parts of a graph, with bit sets.
 
 use crate::linear_solver::graph::{Graph, NONE, number};
 
-/// The most vertices that count as neighbors: graphs whose vertices have hundreds of neighbors would take long.
+/// Limit of vertices counted as neighbors: graphs whose vertices have hundreds of neighbors would take long.
 const MOST: usize = 1024;
 
-/// An order of some vertices of a graph that are eliminated before all their other neighbors. Those count as neighbors:
-/// what touches the boundary of the part is eliminated late (Pellegrini, Roman and Amestoy, Concurrency: Pract. Exper.
-/// 12, 2000). `local` is as for [`Graph::part`]. The order names places in `vertices`.
+/// An order of some vertices of a graph that are eliminated before all their other neighbors. These other neighbors
+/// count in the degrees, so vertices at the boundary of the part are eliminated late (Pellegrini, Roman and Amestoy,
+/// Concurrency: Pract. Exper. 12, 2000). `local` is as for [`Graph::part`]. The order contains places in `vertices`.
 pub(super) fn order(graph: &Graph, vertices: &[u32], local: &mut [u32]) -> Vec<u32> {
     let size = vertices.len();
     let mut met = vertices.to_vec();
@@ -49,7 +49,7 @@ fn eliminate(size: usize, words: usize, near: &mut [u64]) -> Vec<u32> {
         degrees[least] = NONE;
         order.push(number(least));
         pivot.copy_from_slice(&near[least * words..][..words]);
-        // The neighbors become neighbors of each other. (Eliminated vertices are in no set.)
+        // The neighbors become neighbors of each other. Eliminated vertices are in no set.
         for word in 0..size.div_ceil(64) {
             let mut rest = pivot[word];
             while rest != 0 {
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn what_touches_the_boundary_comes_late() {
         let graph = Quotient::new(pattern(60, &chain(60)).as_ref(), &[]).unwrap().unwrap().graph;
-        // The front end of the chain: vertex 19 touches the rest.
+        // The front end of the chain: vertex 19 is connected to the rest.
         let part: Vec<u32> = (0..20).collect();
         let order = order(&graph, &part, &mut vec![NONE; 60]);
         assert_eq!((order[0], order[19]), (0, 19));

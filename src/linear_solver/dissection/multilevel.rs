@@ -1,4 +1,4 @@
-//! Separators from the graph alone: found on a coarsened graph, and refined while it is made finer again.
+//! Separators from the graph alone: computed on a coarsened graph and refined on each finer one.
 
 use super::separator::{Separator, grow, refine};
 use crate::linear_solver::graph::{Graph, NONE, number};
@@ -6,10 +6,10 @@ use crate::linear_solver::graph::{Graph, NONE, number};
 /// Number of vertices at which coarsening ends.
 const COARSEST: usize = 50;
 
-/// The weight of the whole over the largest weight of a coarse vertex.
+/// Total weight divided by the largest weight of a coarse vertex.
 const HEAVIEST: i64 = 33;
 
-/// Vertices of the coarsest graph from which a side is grown, each for a try of its own.
+/// Number of start vertices of the coarsest graph from which a side is grown.
 const STARTS: usize = 5;
 
 /// Pseudo-random numbers, the same in every run (xorshift of Marsaglia, J. Stat. Softw. 8, 2003).
@@ -35,8 +35,8 @@ impl Random {
     }
 }
 
-/// Graphs of more vertices are bisected twice, and the lighter separator is taken: one that is a little too heavy costs
-/// much of the fill there, more time in counting it than a second attempt takes.
+/// Graphs with more vertices are bisected twice, and the lighter separator is used: a slightly too heavy one
+/// increases fill there, which costs more time than a second attempt.
 const LARGE: usize = 10_000;
 
 /// A separator of a connected graph (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998).
@@ -72,11 +72,11 @@ fn bisect_by(graph: &Graph, random: &mut Random) -> Separator {
     separator
 }
 
-/// A smaller graph, vertices joined in pairs along the heaviest edges, and for each vertex the one it became part of;
-/// nothing if hardly any can be joined without exceeding the weight `heaviest`.
+/// A smaller graph, with vertices joined in pairs along the heaviest edges, and for each vertex the coarse vertex
+/// that contains it; `None` if hardly any pair has a weight of at most `heaviest`.
 fn coarsen(graph: &Graph, heaviest: i64, random: &mut Random) -> Option<(Graph, Vec<u32>)> {
     let n = graph.size();
-    // Visited in order of their numbers, the vertices of a regular mesh would all be paired along one axis.
+    // If visited in order of their numbers, the vertices of a regular mesh would all be paired along one axis.
     let mut visits: Vec<u32> = (0..number(n)).collect();
     random.shuffle(&mut visits);
     let mut coarse = vec![NONE; n];

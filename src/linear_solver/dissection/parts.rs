@@ -1,13 +1,13 @@
-//! Parts of a structure that are alike in weight, by the same separators: pieces far smaller than a part, in the order
-//! of the tree of dissection, one part after the other.
+//! Parts of a structure with similar weights, by the same separators: pieces far smaller than a part, assigned to
+//! parts in the order of the dissection tree.
 
 use super::multilevel;
 use super::separator::BETWEEN;
 use crate::error::Result;
 use crate::linear_solver::graph::{Graph, NONE, number};
 
-/// Pieces for each part. Pieces are compact, and neighbors in the tree are neighbors in space as a rule; so parts are
-/// as good as their largest pieces, and as much alike as the smallest.
+/// Pieces per part. Pieces are compact, and neighbors in the tree are usually neighbors in space. So parts are as
+/// compact as their largest pieces, and their weights differ by the smallest ones.
 const PIECES: i64 = 32;
 
 /// The part of each vertex.
@@ -31,14 +31,14 @@ pub(super) fn parts(graph: &Graph, count: usize) -> Result<Vec<usize>> {
 }
 
 struct Pieces {
-    /// What is not heavier is not cut.
+    /// Parts of at most this weight are not cut.
     largest: i64,
     /// Vertices, piece by piece.
     order: Vec<u32>,
 }
 
 impl Pieces {
-    /// Cuts a part of the graph, whose vertices have these names, into halves, and those again.
+    /// Cuts a part of the graph, whose vertices have these names, recursively into halves.
     fn cut(&mut self, part: &Graph, names: &[u32]) -> Result<()> {
         if part.total() <= self.largest || part.size() < 2 {
             self.order.extend(names);
@@ -54,7 +54,7 @@ impl Pieces {
                 self.order.extend(names);
                 return Ok(());
             }
-            // What is between belongs to the lighter side.
+            // The separator is added to the lighter side.
             let [one, other, _] = separator.weights;
             sides[usize::from(other < one)].extend(separator.labeled(BETWEEN));
         }
@@ -78,7 +78,7 @@ mod tests {
         weights
     }
 
-    /// Edges between vertices of different parts.
+    /// Number of edges between vertices of different parts.
     fn cut(graph: &Graph, parts: &[usize]) -> usize {
         let crossing = |(vertex, part): (u32, &usize)| {
             graph.neighbors(vertex).iter().filter(|&&next| parts[next as usize] != *part).count()
@@ -105,8 +105,8 @@ mod tests {
         }
     }
 
-    /// A chain in p parts has p − 1 edges between them at least, and two for each piece that lies apart from the rest
-    /// of its part: of those along one path of the tree, at most.
+    /// A chain in p parts has at least p − 1 edges between them, and two more for each piece apart from the rest of
+    /// its part: at most the pieces along one path of the tree.
     #[test]
     fn few_edges_join_parts() {
         for count in [2, 3, 7] {
@@ -114,7 +114,7 @@ mod tests {
             let cut = cut(&graph, &parts(&graph, count).unwrap());
             assert!(cut >= count - 1 && cut <= 5 * count, "{cut} for {count} parts");
         }
-        // Slabs of a cube: a plane of edges, nine for each of its nodes (but at the rim), times the cuts.
+        // Slabs of a cube: a plane of edges, nine per node (fewer at the rim), times the number of cuts.
         for (side, count) in [(8, 2), (12, 2), (12, 3), (12, 4), (12, 8)] {
             let (n, pairs) = cube(side);
             let graph = Quotient::new(pattern(n, &pairs).as_ref(), &[]).unwrap().unwrap().graph;

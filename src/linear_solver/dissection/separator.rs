@@ -7,16 +7,16 @@ use std::collections::BinaryHeap;
 /// The label of vertices that separate side 0 from side 1.
 pub(super) const BETWEEN: u8 = 2;
 
-/// Neither side may weigh more than this share of the whole.
+/// Largest share of the total weight in either side.
 const BALANCE: f64 = 0.57;
 
-/// Moves without an improvement after which a pass ends.
+/// Number of moves without improvement after which a pass ends.
 const PATIENCE: usize = 100;
 
-/// Passes of refinement on one graph, at most.
+/// Largest number of refinement passes on one graph.
 const PASSES: usize = 6;
 
-/// A partition into two sides without an edge between them, and what separates them.
+/// A partition into two sides without an edge between them, and their separator.
 #[derive(Clone, Debug)]
 pub(super) struct Separator {
     /// For each vertex its side, or [`BETWEEN`].
@@ -34,8 +34,8 @@ impl Separator {
         Self { label, weights }
     }
 
-    /// What is minimized: first the excess weight of a side, then the weight of the separator, then the difference of
-    /// the sides.
+    /// The minimized cost: first the excess weight of a side, then the weight of the separator, then the difference
+    /// of the sides.
     pub(super) fn cost(&self) -> [i64; 3] {
         let [one, other, between] = self.weights;
         [(one.max(other) - self.limit()).max(0), between, (one - other).abs()]
@@ -46,12 +46,12 @@ impl Separator {
         (0..).zip(&self.label).filter(|(_, found)| **found == label).map(|(vertex, _)| vertex).collect()
     }
 
-    /// The same separator in the finer graph, whose vertex i is part of vertex `coarse[i]` of this one's.
+    /// The same separator in the finer graph, whose vertex i is part of vertex `coarse[i]` of this graph.
     pub(super) fn projected(&self, coarse: &[u32]) -> Self {
         Self { label: coarse.iter().map(|&vertex| self.label[vertex as usize]).collect(), weights: self.weights }
     }
 
-    /// The most that a side may weigh.
+    /// The largest weight of a side.
     fn limit(&self) -> i64 {
         // Weights are counts of dofs.
         #[allow(clippy::cast_possible_truncation)]
@@ -60,17 +60,17 @@ impl Separator {
     }
 }
 
-/// A separator whose vertices are moved to one of the sides; the memory for that.
+/// A separator whose vertices are moved to one of the sides, with memory for that.
 struct Mover<'g> {
     graph: &'g Graph,
     separator: Separator,
-    /// The side that vertices are moved to.
+    /// The side to which vertices are moved.
     side: u8,
-    /// For each vertex of the separator, the weight of its neighbors on the other side: they would take its place.
+    /// For each vertex of the separator, the weight of its neighbors on the other side, which would replace it.
     beyond: Vec<i64>,
-    /// Vertices of the separator by the weight that the separator loses with them; some entries are outdated.
+    /// Vertices of the separator by the weight that the separator loses by moving them; some entries are outdated.
     queue: BinaryHeap<(i64, Reverse<u32>)>,
-    /// Vertices that have changed their label, with the one they had.
+    /// Vertices that have changed their label, with the previous label.
     log: Vec<(u32, u8)>,
 }
 
@@ -99,7 +99,7 @@ impl<'g> Mover<'g> {
         self.offer(vertex);
     }
 
-    /// The vertex with which the separator loses most.
+    /// The vertex whose move makes the separator lightest.
     fn best(&mut self) -> Option<u32> {
         while let Some((gain, Reverse(vertex))) = self.queue.pop() {
             if self.separator.label[vertex as usize] == BETWEEN && self.gain(vertex) == gain {
@@ -116,7 +116,7 @@ impl<'g> Mover<'g> {
         self.separator.weights[usize::from(to)] += weight;
     }
 
-    /// Moves a vertex from the separator to the side; its neighbors on the other side take its place.
+    /// Moves a vertex from the separator to the side; its neighbors on the other side replace it.
     fn shift(&mut self, vertex: u32) {
         let (graph, other) = (self.graph, 1 - self.side);
         self.relabel(vertex, self.side);
@@ -137,9 +137,9 @@ impl<'g> Mover<'g> {
         }
     }
 
-    /// One pass of Fiduccia and Mattheyses (19th Design Automation Conference, 1982) toward a side: the best moves one
-    /// after the other, also where they make the separator heavier for a while; what is kept is the best separator met.
-    /// Whether that is better than the one before.
+    /// One pass of Fiduccia and Mattheyses (19th Design Automation Conference, 1982) toward a side: makes the best
+    /// moves one by one, even if they temporarily make the separator heavier, and keeps the best separator found.
+    /// Returns whether it is better than before.
     fn pass(&mut self, side: u8) -> bool {
         self.side = side;
         self.log.clear();
@@ -172,8 +172,8 @@ impl<'g> Mover<'g> {
     }
 }
 
-/// Makes a separator lighter, or better balanced: passes toward one side and the other, the lighter one first, until
-/// neither helps. A slanted separator becomes straight by moving to one side and back; a pass that went both ways at
+/// Makes a separator lighter or better balanced: passes toward both sides in turn, the lighter one first, until
+/// neither helps. A slanted separator becomes straight by moving to one side and back; a pass in both directions at
 /// once would only move vertices to and fro.
 pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
     let mut side = u8::from(separator.weights[1] < separator.weights[0]);
@@ -189,8 +189,8 @@ pub(super) fn refine(graph: &Graph, separator: Separator) -> Separator {
     mover.separator
 }
 
-/// Grows side 0 from a vertex, always by the vertex that makes its boundary lightest, until it weighs as much as the
-/// rest.
+/// Grows side 0 from a vertex, always adding the vertex that makes its boundary lightest, until it weighs as much as
+/// the rest.
 pub(super) fn grow(graph: &Graph, seed: u32) -> Separator {
     let mut label = vec![1; graph.size()];
     label[seed as usize] = BETWEEN;

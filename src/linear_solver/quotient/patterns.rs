@@ -26,7 +26,7 @@ pub(in crate::linear_solver) fn clique(from: usize, to: usize) -> Vec<(usize, us
     (from..to).flat_map(|i| (from..i).map(move |j| (j, i))).collect()
 }
 
-/// A cube of nodes with 27 neighbors each, the node itself included, and three dofs a node.
+/// A cube of nodes, each with 27 neighbors including itself and three dofs.
 pub(in crate::linear_solver) fn cube(side: usize) -> (usize, Vec<(usize, usize)>) {
     let node = |x: usize, y: usize, z: usize| x + side * (y + side * z);
     let near = |x: usize| x.saturating_sub(1)..(x + 2).min(side);
@@ -40,8 +40,8 @@ pub(in crate::linear_solver) fn cube(side: usize) -> (usize, Vec<(usize, usize)>
     (3 * side.pow(3), pairs)
 }
 
-/// Pairs by a linear congruential generator (Knuth's MMIX): the package has the tests of this file, but no crate for
-/// them.
+/// Pairs by a linear congruential generator (Knuth's MMIX); the package has the tests of this file, but no crate for
+/// random numbers.
 pub(in crate::linear_solver) fn strewn(n: usize, pairs: usize, mut state: u64) -> Vec<(usize, usize)> {
     let mut dof = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -50,8 +50,8 @@ pub(in crate::linear_solver) fn strewn(n: usize, pairs: usize, mut state: u64) -
     (0..pairs).map(|_| (dof(), dof())).collect()
 }
 
-/// A frame of beams: nodes one after the other, of which each fifth has one dof (a hinge), the others have three. Every
-/// seventh is tied to its predecessor by its first dof alone.
+/// A frame of beams: a sequence of nodes, in which each fifth has one dof (a hinge) and the others three. Every
+/// seventh is tied to its predecessor by its first dof only.
 pub(in crate::linear_solver) fn frame(nodes: usize) -> (usize, Vec<(usize, usize)>) {
     let mut pairs = Vec::new();
     let (mut n, mut before) = (0, 0..0);

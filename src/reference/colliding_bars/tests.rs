@@ -8,7 +8,7 @@ const RESTING: Bar = Bar { velocity: 0.0, ..BAR };
 /// Half of the symmetric pair with four contact nodes: Z = 1/4.
 const QUARTER: Bar = Bar { area: 0.25, velocity: 0.05, ..BAR };
 const V0: f64 = 0.05;
-/// A short time, to look just before an event.
+/// A short time, for values just before an event.
 const LATER: f64 = 1e-6;
 
 fn close(value: f64, expected: f64, tolerance: f64) {
@@ -279,8 +279,8 @@ fn bars_that_do_not_approach_never_press() {
 
 #[test]
 fn vibrating_bar_hits_the_wall_twice() {
-    // Z = c = l = 1. The incoming invariant is 1, -1, 1, 1 for half a unit of time each, chosen so that the gap
-    // opens at 0.5, is 0.5 at 1, closes at 1.5, and opens for good at 2.
+    // Z = c = l = 1. The incoming invariant is 1, -1, 1, 1 for half a unit of time each, chosen so that the gap opens
+    // at 0.5, is 0.5 at 1, closes at 1.5, and opens permanently at 2.
     let bar = Bar { young: 1.0, density: 1.0, area: 1.0, length: 1.0, velocity: 0.0 };
     let mut solution = CollidingBars::against_wall(bar, 0.0, 9.0).unwrap();
     let mut past = Steps(Vec::new());
