@@ -129,8 +129,8 @@ impl<T: Real> DenseCholesky<T> {
                 };
             }
             let pivot = row[first[i]..i].iter().fold(diagonal[i], |p, &x| p - x * x);
-            // A pivot above the rounding of its own diagonal entry may still be rounding: that of earlier rows,
-            // amplified by their pivots.
+            // A pivot above the rounding of its own diagonal entry may still be rounding of earlier rows, amplified
+            // by their pivots.
             let sound = pivot > dependent * diagonal[i]
                 && (pivot > suspect * diagonal[i] || {
                     let length =

@@ -40,7 +40,7 @@ use crate::error::{Error, Result};
 use crate::tableau::Tableau;
 use std::ops::RangeInclusive;
 
-/// A time-integration scheme: a name and a [`Tableau`], nothing else.
+/// A time-integration scheme: just a name and a [`Tableau`].
 ///
 /// Effective matrix, right-hand side, start-up, momentum functional, λ_v/λ_a and history projection are derived from
 /// the rows. A user's scheme is a single function:

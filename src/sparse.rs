@@ -160,8 +160,8 @@ fn kept_as_it_is(source: SymbolicSparseColMatRef<'_, usize>, pointers: &[usize],
     source.col_nnz().is_none() && source.col_ptr() == pointers && source.row_idx() == rows
 }
 
-/// A fixed pattern for weighted sums of several matrices, with rows and columns of some dofs replaced by those of the
-/// identity; entries are copied through precomputed slots.
+/// A fixed pattern for weighted sums of several matrices, with identity rows and columns for some dofs; entries are
+/// copied through precomputed slots.
 #[derive(Debug)]
 pub(crate) struct Combination {
     /// Empty if it is [left to the first source](Self::leave_pattern).
@@ -276,7 +276,7 @@ impl Combination {
         SparseColMat::new(self.pattern, values)
     }
 
-    /// Rejects sources, and a diagonal, whose sizes differ from those of the pattern; each source has its name.
+    /// Rejects sources, and a diagonal, whose sizes differ from the pattern; each source has its name.
     pub(crate) fn check(
         &self,
         diagonal: usize,

@@ -25,7 +25,7 @@ pub struct LocalError {
 }
 
 /// The local error of a scheme, from a free oscillation at small Ω: the error added per step is the error of the
-/// principal root, and the distance is that of its principal vector, so the effect of earlier steps on v and a is
+/// principal root, and the distance belongs to its principal vector, so the effect of earlier steps on v and a is
 /// included.
 ///
 /// `None` if the error is not proportional to the distance: first-order schemes like Newmark's with γ ≠ ½ have an

@@ -22,8 +22,8 @@ use crate::tableau::Tableau;
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 pub fn period_elongation(tableau: &Tableau) -> Option<f64> {
-    // The response η of u″ + k u to the force eᵗ at k = −1, where the exact response is unbounded: 1/η is the missing part
-    // of k, e h² + …, so eᵗ is the scheme's motion for u″ = (1 + e h²) u.
+    // The response η of u″ + k u to the force eᵗ at k = −1, where the exact response is unbounded: 1/η is the missing
+    // part of k, e h² + …, so eᵗ is the scheme's motion for u″ = (1 + e h²) u.
     let [displacement, ..] = response(tableau, [0.0, -1.0], 1.0)?;
     let missing = Series::monomial(1.0, 0).over(&displacement);
     // In terms of the rate σ = √(1 + e h²) that the scheme was given: σ h (1 − ½ e (σ h)²) is the exponent of a step.

@@ -1,5 +1,5 @@
-//! What a corrector works with: the jumps of a stage, the projection that removes them, impulses and forces along
-//! rows, and their bookkeeping. Code that serves a single corrector is in the file of that corrector.
+//! Data and operations for correctors: the jumps of a stage, the projection that removes them, impulses and forces
+//! along rows, and their bookkeeping. Code that serves a single corrector is in the file of that corrector.
 
 mod energy;
 mod friction;

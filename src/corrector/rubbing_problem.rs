@@ -7,7 +7,7 @@ use crate::dense::DenseCholesky;
 use crate::error::Result;
 use crate::real::Real;
 
-/// Whether a friction of this size is that of sliding: μ times the normal force, up to rounding.
+/// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
 pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
     friction >= T::of(1.0 - 1e-8).min(T::one() - T::of(8.0) * T::epsilon()) * bound.max(T::zero())
 }

@@ -137,8 +137,8 @@ impl<T: Real> Switching<T> {
 
     /// Adds a fraction of each row's miss to its excess: one half in the first iteration (`before` is `None`), then
     /// the factor of Irons and Tuck (Int. J. Numer. Meth. Eng. 1, 1969) from the last fraction. A reduced force lets
-    /// an opening contact open farther, which lowers its miss; it lets a closing contact penetrate deeper, which
-    /// raises its miss. Returns the fraction.
+    /// an opening contact open farther, so that it needs a smaller reduction; it lets a closing contact penetrate
+    /// deeper, so that it needs a larger one. Returns the fraction.
     pub(crate) fn move_excess(&mut self, misses: &[T], before: Option<T>) -> T {
         let mut part = T::of(0.5);
         if let Some(before) = before {

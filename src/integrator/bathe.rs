@@ -15,20 +15,20 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// M a + C v + f_int(u) = f + Gᵀλ  at the end of either stage
 /// ```
 ///
-/// * Order 2, two solves a step. For γ = 2 − √2 and ρ∞ = 0 (the default; TR-BDF2 of Bank et al. 1985) both stages
+/// * Order 2, two solves per step. For γ = 2 − √2 and ρ∞ = 0 (the default; TR-BDF2 of Bank et al. 1985) both stages
 ///   share one effective matrix.
-/// * Unconditionally stable with the ρ∞ given; the first step already removes a stiff mode (ρ∞ = 0). At equal number of
-///   solves the default is more accurate on smooth motion than the multistep schemes, less than Chung–Hulbert.
+/// * Unconditionally stable with the given ρ∞; the first step already removes a stiff mode (ρ∞ = 0). At equal number
+///   of solves the default is more accurate on smooth motion than the multistep schemes, less than Chung–Hulbert.
 /// * Conserves linear momentum.
 /// * Contact is imposed on the displacements at the end of either stage; the impulse is h Σ β_s λ_s. If a contact
 ///   closes in the second stage, that stage reads the first one, from before the impact: history projection helps.
-/// * For ρ∞ = 0, where q₀ = q₁, stage 1 turns stage 2 into the formula of Bathe and Baig, v' = (c₁ u + c₂ u₁ + c₃ u')/h
-///   and a' alike, c₁ = (1 − γ)/γ, c₂ = −1/(γ(1 − γ)), c₃ = (2 − γ)/(1 − γ): v + v₁ = 2 (u₁ − u)/(γh) and a + a₁ = 2
-///   (v₁ − v)/(γh). A correction of v₁ and a₁ breaks these relations, unless the past is projected as well. For an
-///   impact in the first stage the raw multiplier and λ_v of that step are therefore those of Noh and Bathe's form: λ
-///   contains the approach velocity left in v (1.3 to 7.4 F₀ for two bars; λ_v takes it out of the force). The formula
-///   of three displacements does not contain it (λ stays below F₀), and releases an early impact. Reported forces of
-///   this form are those of a projected past.
+/// * For ρ∞ = 0, where q₀ = q₁, stage 1 makes stage 2 equal to the formula of Bathe and Baig,
+///   v' = (c₁ u + c₂ u₁ + c₃ u')/h and similarly for a', with c₁ = (1 − γ)/γ, c₂ = −1/(γ(1 − γ)), c₃ = (2 − γ)/(1 − γ):
+///   v + v₁ = 2 (u₁ − u)/(γh) and a + a₁ = 2 (v₁ − v)/(γh). A correction of v₁ and a₁ breaks these relations, unless the past is
+///   projected too. After an impact in the first stage the two forms therefore differ. In this form λ contains the
+///   approach velocity left in v (1.3 to 7.4 F₀ for two bars), and λ_v removes it from the force. The formula of
+///   three displacements does not contain it (λ stays below F₀), and releases an early impact. Reported forces of
+///   this form equal those for a projected past.
 ///
 /// ```
 /// use contact_dynamics::{Bathe, TimeIntegrator, analysis};

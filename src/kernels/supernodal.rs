@@ -117,7 +117,7 @@ struct Visit<'a, T> {
 }
 
 impl<T: Scalar> Visit<'_, T> {
-    /// `values` start with those of supernode `from`.
+    /// `values` start at supernode `from`.
     fn by_plan(&self, plan: &Plan, from: usize, values: &mut [T]) -> Result<(), usize> {
         match plan {
             Plan::Serial(range) => {
@@ -176,7 +176,7 @@ impl<T: Scalar> Visit<'_, T> {
         })
     }
 
-    /// A supernode and its columns; `values` start with those of supernode `from`.
+    /// A supernode and its columns; `values` start at supernode `from`.
     fn target<'v>(&'v self, s: usize, from: usize, values: &'v mut [T]) -> (Target<'v, T>, &'v mut [T]) {
         let places = self.problem.symbolic.col_ptr_for_val();
         let (done, own) = values.split_at_mut(places[s] - places[from]);

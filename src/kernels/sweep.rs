@@ -179,7 +179,7 @@ impl<'a, T> Panel<'a, T> {
 }
 
 impl<T: Scalar> Panel<'_, T> {
-    /// Eliminates the columns: `w` holds their right-hand sides, followed by those of the rows below.
+    /// Eliminates the columns: `w` holds their right-hand sides, followed by the right-hand sides of the rows below.
     fn forward(&self, arch: Arch, w: &mut [T]) {
         let threads = if self.is_heavy() { threads::count() } else { 1 };
         if threads == 1 {

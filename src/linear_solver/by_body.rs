@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Bodies are the connected components of the matrix. Contact and ties by multipliers do not couple them, so bodies
 /// in contact stay separate in the effective matrix; bodies that share a dof, a spring or a penalty in K are one.
 /// Each is ordered, factorized and solved separately, with one solver for all or with its own solver
-/// ([`body`](Self::body)). Results equal those of a single factorization up to rounding.
+/// ([`body`](Self::body)). Results equal a single factorization up to rounding.
 ///
 /// Dofs that are coupled to no other (prescribed dofs, point masses, a whole diagonal matrix) form one diagonal part
 /// for any solver; their entries must be positive. Condensation is offered if every body with contact dofs is

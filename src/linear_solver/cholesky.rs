@@ -274,7 +274,7 @@ impl<T: Real> Factor<T> {
         self.symbolic.nrows()
     }
 
-    /// Columns of the interface in the order of elimination; those of the interior precede them.
+    /// Columns of the interface in the order of elimination; the columns of the interior precede them.
     fn trailing(&self) -> Range<usize> {
         self.size() - self.interface.len()..self.size()
     }

@@ -18,7 +18,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// Rows and columns are first scaled by powers of two, to largest entries of about one: pivots do not depend on the
 /// units of translations and rotations, or on a stiff body next to a soft one.
 ///
-/// **Singular matrices** are rejected as [`Error::Singular`]: those with a condition number, after scaling, beyond
+/// **Singular matrices** are rejected as [`Error::Singular`] if their condition number, after scaling, exceeds
 /// 1/(16 ε) (Hager's estimate of the 1-norm). The solution for a generic right-hand side reveals it: one solve per
 /// factorization, and two more only if that solution is large. The named dof has the largest entry of the null
 /// vector.

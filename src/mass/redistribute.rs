@@ -126,7 +126,7 @@ pub fn redistribute<T: Real>(
 ///
 /// Nonnegative shares of neighbors keep M positive definite on the dofs that keep mass. In all other cases (couplings
 /// of quadratic elements are negative, density may fall) the result is factorized once to check it. Entries between
-/// dofs of different groups belong to no group; those of massless dofs are lost.
+/// dofs of different groups belong to no group and are lost if one of the dofs is massless.
 ///
 /// Rows and columns of massless dofs have no stored entries, and no zeros are stored elsewhere: a diagonal result has
 /// a diagonal pattern.

@@ -88,7 +88,7 @@ impl<T: Real> Interface<T> {
 ///
 /// Eliminating the frame leaves `0 ≤ (F_1 + F_2) l + free_2 − free_1 + gap ⊥ l ≥ 0`, which any [`ContactSolver`] can
 /// solve. A body needs no knowledge of the other one or its code: its step continues with the forces of the frame.
-/// Results equal those of the monolithic form up to rounding (`tests/partitioned/frames.rs`).
+/// Results equal the monolithic form up to rounding (`tests/partitioned/frames.rs`).
 ///
 /// A side may combine several bodies, with a block-diagonal flexibility: of bodies in a row every other one belongs
 /// to the first side. For three bodies in mutual contact, and for nodes that do not match, use an

@@ -50,8 +50,7 @@ pub struct Accuracy {
     /// times of about 1/ω: observed mean errors were about 2/(ω T) for bodies that touch at a point.
     pub cutoff: f64,
     /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω. With longer steps the observed
-    /// overshoot of the force behind a front grew, and its error was that of the step, not of the modes. Infinite for
-    /// a rigid body.
+    /// overshoot of the force behind a front grew, due to the step and not to the modes. Infinite for a rigid body.
     pub longest_step: f64,
 }
 
@@ -90,7 +89,7 @@ enum Damping<'a> {
 ///
 /// (of 3 R, statics need one R, the others are [`softening`](Self::softening)). Over (η, u_b) this has M = diag(I, 0)
 /// and a stiffness built from Ω², P and F⁻¹. The contact dofs have no mass: use schemes for [dofs without
-/// mass](crate::analysis::massless_factor), such as those of [`Preset`](crate::Preset), and no corrector.
+/// mass](crate::analysis::massless_factor), such as the schemes of [`Preset`](crate::Preset), and no corrector.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -144,8 +143,8 @@ impl<T: Real> std::fmt::Debug for Reduction<'_, T> {
 struct Interface {
     /// Weights σ_k of the modes.
     sigma: Vec<f64>,
-    /// Static responses S to forces at the contact dofs, in addition to those of the modes (responses to
-    /// displacements for [`Boundary::CraigBampton`]), column by column.
+    /// Static responses S to forces at the contact dofs beyond the responses of the modes (responses to displacements
+    /// for [`Boundary::CraigBampton`]), column by column.
     fields: Vec<f64>,
     /// F⁻¹, row by row; the stiffness of the contact dofs.
     stiffness: Vec<f64>,

@@ -169,8 +169,8 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
         Self { start, ..self }
     }
 
-    /// Displacements of all dofs at the start ([`ReducedBody::displacement`]); zero by default. Contact dofs are computed
-    /// from the modes, loads and contact.
+    /// Displacements of all dofs at the start ([`ReducedBody::displacement`]); zero by default. Contact dofs are
+    /// computed from the modes, loads and contact.
     #[must_use]
     pub fn displacement(self, displacement: Vec<T>) -> Self {
         Self { displacement: Some(displacement), ..self }
@@ -188,8 +188,8 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
         Self { rows, ..self }
     }
 
-    /// A load on all dofs that replaces the constant loads of the bodies: the closure writes the load at t into zeros. It
-    /// is interpolated linearly within a step.
+    /// A load on all dofs that replaces the constant loads of the bodies: the closure writes the load at t into
+    /// zeros. It is interpolated linearly within a step.
     #[must_use]
     pub fn load(self, load: impl FnMut(f64, &mut [T]) + Send + 'a) -> Self {
         Self { load: Some(LoadFunction(Box::new(load))), ..self }

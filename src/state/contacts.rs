@@ -44,8 +44,8 @@ impl PartialEq for Names {
 
 /// Multipliers and flags of the contacts, one entry per candidate, in the order of the constraints and their rows.
 ///
-/// With friction, the multipliers of tangential rows follow those of all gaps: forces, impulses, λ_v and λ_a have one
-/// entry per row.
+/// With friction, the multipliers of tangential rows follow the multipliers of all gaps: forces, impulses, λ_v and
+/// λ_a have one entry per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState<T> {
     pub(crate) ids: Vec<ContactId>,

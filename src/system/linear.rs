@@ -86,8 +86,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// # Errors
     ///
     /// [`Error::Empty`], [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for an unsymmetric M
-    /// and for a K with entries in one triangle only (if intended, store a zero in the other one), [`Error::Mass`] for a
-    /// negative diagonal mass. Zero is allowed on fixed or driven dofs, and elsewhere with schemes that support
+    /// and for a K with entries in one triangle only (if intended, store a zero in the other one), [`Error::Mass`]
+    /// for a negative diagonal mass. Zero is allowed on fixed or driven dofs, and elsewhere with schemes that support
     /// [dofs without mass](crate::analysis::massless_factor).
     pub fn new(mass: SparseColMat<usize, T>, stiffness: SparseColMat<usize, T>) -> Result<Self> {
         sparse::check_symmetric("mass", mass.as_ref())?;
@@ -283,8 +283,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     }
 }
 
-/// Rejects negative masses and those that are not finite. Building a simulation rejects zero masses if the scheme
-/// does not admit them.
+/// Rejects masses that are negative or not finite. Building a simulation rejects zero masses if the scheme does not
+/// admit them.
 fn check_masses<T: Real>(mass: &[T]) -> Result<()> {
     match mass.iter().position(|&m| !(m >= T::zero() && m.is_finite())) {
         Some(dof) => Err(Error::Mass { dof, value: mass[dof].value() }),

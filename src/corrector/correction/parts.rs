@@ -1,5 +1,5 @@
-//! What a corrector reads from a stage (rows, motion, forces, coefficients of the scheme), and the results that it
-//! may set directly.
+//! Data of a stage for correctors (rows, motion, forces, coefficients of the scheme), and the results that they may
+//! set directly.
 
 use super::Correction;
 use crate::real::Real;

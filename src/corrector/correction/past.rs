@@ -112,7 +112,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// Uses the jumps of one field of past state k measured with the current rows, if the rows of the past would move
     /// it much farther. Rows that are nearly equal, but have turned in between, may contradict each other in the past
-    /// and together move it very far. With the current rows it moves no farther than the bodies have moved.
+    /// and together move it very far. With the current rows it moves at most as far as the bodies have moved.
     fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
         self.look_straight((k, field), rows)?;
         let Self { buffers, projection, past, new, .. } = self;
