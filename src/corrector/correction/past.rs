@@ -18,7 +18,7 @@ impl<T: Real> Correction<'_, T> {
     ///
     /// [`Error::ContactNotFinite`](crate::Error::ContactNotFinite);
     /// [`Error::Incompatible`](crate::Error::Incompatible) if the corrector's
-    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
+    /// [`edits`](crate::corrector::Effects::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
         let leave = self.note_outgoing()?;
         let begins = |&row: &usize| !self.was_closed[row] || self.sticks(row) && !self.was_sticking[row];
@@ -161,7 +161,7 @@ impl<T: Real> Correction<'_, T> {
     /// # Errors
     ///
     /// [`Error::Incompatible`](crate::Error::Incompatible) if later rows read past states and the corrector's
-    /// [`edits`](crate::corrector::Corrector::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); the
+    /// [`edits`](crate::corrector::Effects::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); the
     /// errors of [`compliances`](Self::compliances).
     pub fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
         let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;

@@ -258,7 +258,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         self
     }
 
-    /// Accumulates the works of the energy balance ([`Energy::works`](super::Energy::works)). Each step costs a load
+    /// Accumulates the works of the energy balance ([`Energy::works`](crate::Energy::works)). Each step costs a load
     /// and a product with C, with supports one evaluation of f, with contacts their gaps and rates once more.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {

@@ -9,7 +9,7 @@ use crate::simulation::run::results::Outcome;
 use crate::state::resolution;
 
 impl<T: Real> Simulation<'_, T> {
-    /// Takes one step. Under [`step_control`](super::SimulationBuilder::step_control) smaller sizes are tried until
+    /// Takes one step. Under [`step_control`](crate::SimulationBuilder::step_control) smaller sizes are tried until
     /// one succeeds.
     ///
     /// # Errors
