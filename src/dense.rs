@@ -247,8 +247,8 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
-    /// Solves A x = b in place; for a singular A the x of least norm among those of least residual (none by a general
-    /// factorization).
+    /// Solves A x = b in place; for a singular A the least-norm x of least residual. Not defined for a singular general
+    /// factorization.
     pub(crate) fn solve(&mut self, x: &mut [T]) {
         let n = self.size;
         if self.kind == Kind::General {

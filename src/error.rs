@@ -195,7 +195,7 @@ pub enum Error {
         facet: usize,
         /// Its nodes.
         nodes: Vec<usize>,
-        /// What is wrong with it, and what to do.
+        /// Its defect, and what to do.
         reason: &'static str,
     },
     /// A time-integration tableau is malformed.
@@ -205,7 +205,7 @@ pub enum Error {
         integrator: String,
         /// Index of the stage.
         stage: usize,
-        /// What is wrong with it.
+        /// Its defect.
         reason: &'static str,
     },
     /// A time-integration tableau does not converge to the motion for any step size: its order is 0.
@@ -672,7 +672,7 @@ pub enum Error {
     /// A step, or another collective call, has failed on another rank and therefore on this one.
     #[error("rank {rank} has failed: {message}")]
     OtherRank {
-        /// Number of the rank (the first of those that failed).
+        /// Number of the first rank that failed.
         rank: usize,
         /// Whether a smaller step may help.
         recoverable: bool,

@@ -100,7 +100,7 @@ impl Preset {
 
     /// The mass matrix, from the consistent one.
     ///
-    /// `contact` lists the dofs that become massless: those of the contact nodes, in the normal direction if it is
+    /// `contact` lists the dofs that become massless: the dofs of the contact nodes, in the normal direction if it is
     /// along an axis, otherwise in all directions. With friction use all directions too, because mass along the
     /// surface makes the friction force ring. `groups` are as in [`mass::redistribute`]: one number per body and
     /// direction. `neighbors` is the pattern of the stiffness matrix. `courant` is the Courant number c h/h_e of the

@@ -93,7 +93,7 @@ pub trait Kernels: Sized {
     fn supernodal_solve(factor: &Supernodal<'_, Self>, order: Option<&[usize]>, rhs: &mut [Self], memory: &mut [Self]);
     /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
     fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
-    /// The backward sweep over `columns`; entries behind them hold the solution.
+    /// The backward sweep over `columns`; later entries hold the solution.
     fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
     /// Forward along two chains.
     fn chains_forward(chains: Chains<'_, Self>);

@@ -283,7 +283,7 @@ impl<T: Real> AppliedSet<T> {
 mod tests {
     use super::*;
 
-    /// A row that is held without a force, but for rounding, does not pull.
+    /// A closed row whose force is zero to rounding does not pull.
     #[test]
     fn multipliers_of_rounding_do_not_pull() {
         let mut kept = 0;

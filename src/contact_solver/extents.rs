@@ -1,5 +1,5 @@
-//! The nonzero range of each row of W. In a row of bodies, the contacts of one joint move only those of the next
-//! joints, so the zeros beyond need not be read.
+//! The nonzero range of each row of W. In a row of bodies, the contacts of one joint move only the next joints,
+//! so the zeros beyond need not be read.
 
 use super::ContactProblem;
 use crate::real::Real;

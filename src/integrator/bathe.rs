@@ -24,11 +24,11 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 ///   closes in the second stage, that stage reads the first one, from before the impact: history projection helps.
 /// * For ρ∞ = 0, where q₀ = q₁, stage 1 makes stage 2 equal to the formula of Bathe and Baig,
 ///   v' = (c₁ u + c₂ u₁ + c₃ u')/h and similarly for a', with c₁ = (1 − γ)/γ, c₂ = −1/(γ(1 − γ)), c₃ = (2 − γ)/(1 − γ):
-///   v + v₁ = 2 (u₁ − u)/(γh) and a + a₁ = 2 (v₁ − v)/(γh). A correction of v₁ and a₁ breaks these relations, unless the past is
-///   projected too. After an impact in the first stage the two forms therefore differ. In this form λ contains the
-///   approach velocity left in v (1.3 to 7.4 F₀ for two bars), and λ_v removes it from the force. The formula of
-///   three displacements does not contain it (λ stays below F₀), and releases an early impact. Reported forces of
-///   this form equal those for a projected past.
+///   v + v₁ = 2 (u₁ − u)/(γh) and a + a₁ = 2 (v₁ − v)/(γh). A correction of v₁ and a₁ breaks these relations, unless
+///   the past is projected too. After an impact in the first stage the two forms therefore differ. In this form λ
+///   contains the approach velocity left in v (1.3 to 7.4 F₀ for two bars), and λ_v removes it from the force. The
+///   formula of three displacements does not contain it (λ stays below F₀), and releases an early impact. Reported
+///   forces of this form equal those for a projected past.
 ///
 /// ```
 /// use contact_dynamics::{Bathe, TimeIntegrator, analysis};

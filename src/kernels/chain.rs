@@ -2,7 +2,7 @@
 //!
 //! In a chain each unknown waits for its neighbor, longer than its arithmetic takes. Two chains processed together
 //! share the wait, and fused multiply-add, if the machine has it, halves it.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};

@@ -3,7 +3,7 @@
 //!
 //! If a factor exceeds the caches, the time of a solve is the time to read it: eight right-hand sides take little
 //! longer than one.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for the vector units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use super::cholesky::Supernodal;
 use super::sweep::Panel;

@@ -1,5 +1,5 @@
 //! Products of sparse matrices and vectors.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use super::vector::Accumulate;
 use crate::scalar::Scalar;

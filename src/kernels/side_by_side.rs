@@ -3,7 +3,7 @@
 //!
 //! Compiled for the vector units of the machine that it runs on. The result for one right-hand side does not depend
 //! on the others or on the machine: no product is fused with its sum.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use super::conjugate_gradients::{Blocks, Judge, NEGLIGIBLE, Outcome};
 use crate::scalar::Scalar;

@@ -6,7 +6,7 @@
 //!
 //! The interior is swept branch by branch of its elimination forest, by several threads with the feature `rayon`,
 //! which also share large supernodes.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for these units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use super::cholesky::{Columns, Supernodal, supernodes};
 use super::forest::Forest;

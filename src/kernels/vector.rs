@@ -2,7 +2,7 @@
 //!
 //! `combine` and `recover` are compiled for the vector units of the machine that they run on. Their results are
 //! bitwise the same on any machine: no product is fused with its sum.
-#![allow(clippy::inline_always)] // what is not inlined is not compiled for the machine's vector units
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};

@@ -1,4 +1,4 @@
-//! Sparse Cholesky: faer's simplicial L D Lᵀ for chains (with sweeps of our own), a supernodal L Lᵀ for the rest.
+//! Sparse Cholesky: faer's simplicial L D Lᵀ for chains (with sweeps of this crate), a supernodal L Lᵀ otherwise.
 
 use super::ordering::{self, Ordering};
 use super::shared::Analyses;

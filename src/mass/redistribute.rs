@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// Which dofs receive the mass of the dofs that [`redistribute`] and [`redistribute_consistent`] make massless.
 ///
 /// Mass stays within its group. Each option is the smallest change, Σ δᵢ²/mᵢ for masses mᵢ, under its conditions
-/// (theory, section 14); the options differ in how far mass may move and in what is kept besides the total.
+/// (theory, section 14); the options differ in how far mass may move and in the quantities kept besides the total.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Redistribution<'a> {
@@ -120,9 +120,9 @@ pub fn redistribute<T: Real>(
 /// change the density, Mᵢⱼ(1 + pᵢ/2 + pⱼ/2): the matrix keeps the form of a consistent mass, and a lumped mass is a
 /// special case.
 ///
-/// With [`Redistribution::Uniform`], lumping the result gives the [`redistribute`]d lumped mass; with neighbors too,
-/// if the diagonal is proportional to the row sums (one kind of linear element with constant Jacobian). Least squares
-/// keep the inertia of this matrix, which differs from the inertia of the lumped one.
+/// With [`Redistribution::Uniform`], lumping the result is the same as [`redistribute`] of the lumped mass; with
+/// neighbors too, if the diagonal is proportional to the row sums (one kind of linear element with constant Jacobian).
+/// Least squares keep the inertia of this matrix, which differs from the inertia of the lumped one.
 ///
 /// Nonnegative shares of neighbors keep M positive definite on the dofs that keep mass. In all other cases (couplings
 /// of quadratic elements are negative, density may fall) the result is factorized once to check it. Entries between

@@ -7,7 +7,7 @@ use faer::sparse::SymbolicSparseColMatRef;
 /// Cuts a body into `count` parts with similar numbers of dofs and few neighbors in other parts; returns the part of
 /// each row of the pattern, from 0.
 ///
-/// The pattern (both triangles, with or without diagonal entries) is that of a matrix of the whole body, or of its
+/// The pattern (both triangles, with or without diagonal entries) belongs to a matrix of the whole body, or of its
 /// nodes, with an entry for each two nodes of an element. Rows with the same neighbors, such as the dofs of a node,
 /// stay together if the diagonal has entries. Parts are pieces of the multilevel nested dissection by which
 /// [`Cholesky`](crate::Cholesky) orders solids (Karypis and Kumar, SIAM J. Sci. Comput. 20, 1998). They are the same

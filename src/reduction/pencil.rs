@@ -13,7 +13,7 @@ use crate::sparse::{self, Combination, Product, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
 
 /// The shift σ relative to the median of K_ii/M_ii, the squared frequency of single elements: small compared with all
-/// elastic frequencies except those of very long chains, and large compared with the rounding of K.
+/// elastic frequencies except for very long chains, and large compared with the rounding of K.
 const SHIFT: f64 = 1e-8;
 
 /// A motion is rigid if its strain energy is at most this many roundings of its sum of terms.

@@ -128,8 +128,8 @@ impl Body {
 
     /// Integral of `f(outgoing, incoming)` over the transit time, that is over the bar, at the time `t`.
     ///
-    /// A wave takes `delay` from the contact end to a point. There the outgoing invariant is the one that left at `t
-    /// - delay`, and the incoming one is the one that left at `t + delay - 2 l/c`.
+    /// A wave takes `delay` from the contact end to a point. The outgoing invariant there is the one that left at
+    /// `t - delay`, the incoming one is the one that left at `t + delay - 2 l/c`.
     pub(super) fn integrate(&self, t: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         let pieces = &self.outgoing.0;
         let entered = t - 2.0 * self.transit;

@@ -89,7 +89,7 @@ fn redundant_rows_share_the_force() {
     let both = [AdmissibleSet::NonNegative; 2];
     let lambda = solve(&[1.0; 4], &[-1.0, -1.0], &both, &[0.0; 2]).unwrap();
     assert!((lambda[0] - 0.5).abs() < 1e-14 && (lambda[1] - 0.5).abs() < 1e-14, "{lambda:?}");
-    // The same dof at two gaps: the nearer one alone presses, whatever the guess.
+    // The same dof at two gaps: only the nearer one presses, for any guess.
     for guess in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
         let lambda = solve(&[1.0; 4], &[-1.0, -0.9], &both, &guess).unwrap();
         assert!((lambda[0] - 1.0).abs() < 1e-12 && lambda[1] == 0.0, "{lambda:?}");

@@ -1,5 +1,5 @@
-//! Edits of past states: projection onto newly closed contacts, and velocity changes applied together with those of
-//! the state.
+//! Edits of past states: projection onto newly closed contacts, and velocity changes applied together with the
+//! state's.
 
 use super::{Buffers, Correction};
 use crate::error::Result;
