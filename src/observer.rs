@@ -9,7 +9,7 @@ use crate::state::{ContactStatus, State};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Control {
-    /// Continue.
+    /// Continue the run.
     #[default]
     Continue,
     /// Stop after this step.

@@ -10,6 +10,7 @@ use crate::tableau::Tableau;
 /// they alternate forever. Explicit stages whose displacements are known before their balance bring such dofs into
 /// static balance and carry no error over. Zero for every scheme whose balance holds at its own state; −α_f/(1 − α_f)
 /// for generalized-α (theory, section 15).
+///
 /// ```
 /// use contact_dynamics::{CentralDifference, GeneralizedAlpha, MoreauJean, Newmark, TimeIntegrator, analysis};
 /// assert_eq!(analysis::massless_factor(&Newmark::trapezoidal().tableau()), Some(0.0));

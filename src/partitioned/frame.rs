@@ -141,9 +141,9 @@ impl<T: Real> Frame<T> {
 
     /// The same with a solver of the host's choice.
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem does not fit.
+    /// # Errors
     ///
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem of so many nodes does not fit.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem does not fit.
     pub fn with_solver(nodes: usize, solver: impl ContactSolver<T> + 'static) -> Result<Self> {
         let problem = Problem::new(nodes, Box::new(solver), "a frame")?;
         let zero = || vec![T::zero(); nodes];
