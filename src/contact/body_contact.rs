@@ -210,8 +210,9 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         self
     }
 
-    /// Sets the least distance (length), outside and inside, at which facets and edges are found; by default the mean
-    /// size of the facets, of the coarser surface. The motion within a step is added by the velocities.
+    /// Sets the least distance (length), outside and inside, at which facets and edges are found. The default is the
+    /// mean size of the facets: of the coarser surface for faces and edges, of the surface with the facets for corners.
+    /// The motion within a step is added by the velocities.
     #[must_use]
     pub fn reach(mut self, reach: T) -> Self {
         self.reach = Some(reach);

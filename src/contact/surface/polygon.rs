@@ -7,8 +7,8 @@ pub(super) enum Rule {
     Two,
     /// Exact for products of two bilinear functions on parallelograms.
     Four,
-    /// For quadrilaterals of second order. At a lower degree their rows deviate from the gap derivatives by about
-    /// 1e-4.
+    /// For pairs of a facet of second order and a quadrilateral. At a lower degree the rows of quadrilaterals of second
+    /// order deviate from the gap derivatives by about 1e-4.
     Six,
 }
 

@@ -4,8 +4,8 @@ use super::{Nodes, Point, add_scaled, norm};
 use crate::real::Real;
 use crate::state::resolution;
 
-/// Time increment of the differences, as a share of the time ahead. `simulation/rows/rate_differences.rs` uses the
-/// same.
+/// Time increment of the differences, as a share of the time ahead, as in `simulation/rows/rate_differences.rs` for
+/// `f64`.
 const SHARE: f64 = 1.0 / 16.0;
 
 /// Motion of the fastest node for a difference, as a share of the smallest facet, if the time ahead is not known.
