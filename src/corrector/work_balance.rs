@@ -59,8 +59,8 @@ use crate::tableau::Tableau;
 /// use contact_dynamics::{GeneralizedAlpha, Newmark, TimeIntegrator};
 ///
 /// let balance: &dyn Corrector<f64> = &WorkBalance;
-/// assert!(balance.check(&Newmark::trapezoidal().tableau()).is_ok());
-/// assert!(balance.check(&GeneralizedAlpha::chung_hulbert(0.9)?.tableau()).is_err());
+/// assert!(balance.requirements(&Newmark::trapezoidal().tableau()).scheme.is_ok());
+/// assert!(balance.requirements(&GeneralizedAlpha::chung_hulbert(0.9)?.tableau()).scheme.is_err());
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
