@@ -63,13 +63,13 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     /// Name with options, as printed in tables.
     fn name(&self) -> String;
 
-    /// With what the corrector can act; read once, at build.
+    /// The schemes, systems and contacts that the corrector supports; read at build.
     fn requirements(&self, tableau: &Tableau) -> Requirements {
         let _ = tableau;
         Requirements::default()
     }
 
-    /// What the corrector does.
+    /// The states and contacts that the corrector changes.
     fn effects(&self) -> Effects {
         Effects::default()
     }
@@ -94,8 +94,8 @@ pub trait Corrector<T: Real>: std::fmt::Debug + Send {
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()>;
 }
 
-/// With what a [`Corrector`] can act. `Err` is the reason in the [`Error::Incompatible`](crate::Error::Incompatible) that
-/// `build` returns. The default fits a corrector without friction and restitution.
+/// The schemes, systems and contacts that a [`Corrector`] supports. The default fits a corrector without friction and
+/// restitution. `Err` is the reason in the [`Error::Incompatible`](crate::Error::Incompatible) that `build` returns.
 ///
 /// ```
 /// use contact_dynamics::corrector::Requirements;
@@ -120,7 +120,7 @@ pub struct Requirements {
     pub restitution: Verdict,
 }
 
-/// Whether a corrector can act with something, or the reason why not.
+/// `Ok` if a corrector supports a case, or the reason for the refusal.
 pub type Verdict = std::result::Result<(), &'static str>;
 
 impl Default for Requirements {
@@ -137,11 +137,12 @@ impl Default for Requirements {
     }
 }
 
-/// What a [`Corrector`] does besides changing the state of the stage. The default is none of it.
+/// The states and contacts that a [`Corrector`] changes. By default it changes the state of the stage, for contacts
+/// with mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effects {
-    /// The states that [`correct`](Corrector::correct) edits. A copy of past states, to undo a failed step, is kept only
-    /// if it edits them.
+    /// The states that [`correct`](Corrector::correct) edits. A copy of past states, to undo a failed step, is kept
+    /// only if it edits them.
     pub edits: Edits,
     /// The corrector removes the forces of closed contacts from the accelerations, so that only the smooth motion
     /// remains. The accelerations at the start then contain no contact forces, and friction constrains the slip of a

@@ -165,7 +165,7 @@ fn a_sliding_rod_that_jams_stops_at_once() {
 #[test]
 fn the_impact_of_a_jammed_start_is_that_of_the_closed_form() {
     let mut schemes_of_starts = 0;
-    // (Those that impose contact ahead of the state have the impact in their first step.)
+    // Schemes that impose contact ahead of the state have the impact in their first step.
     for scheme in schemes().filter(|scheme| scheme.takes_corrections() || scheme.name() == "Moreau–Jean(0.5)") {
         for (degrees, over) in [(60.0_f64, 1.2), (40.0, 1.05), (70.0, 1.001)] {
             let found = [false, true].map(|mirrored| {
