@@ -38,7 +38,7 @@ pub use contacts::{Contact, Contacts};
 #[cfg(feature = "search")]
 pub use edge_to_edge::EdgeToEdge;
 pub use gap_function::GapFunction;
-pub(crate) use gaps::{ErasedGaps, Gaps, rounding, share_of_rounding};
+pub(crate) use gaps::{ErasedGaps, Gaps};
 pub(crate) use groups::Groups;
 pub use law::ContactLaw;
 pub(crate) use law::{Course, Measure};

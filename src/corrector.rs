@@ -15,7 +15,7 @@ mod switching;
 mod work_balance;
 mod zero_acceleration;
 
-pub(crate) use crate::contact::{ErasedGaps, Gaps, rounding, share_of_rounding};
+pub(crate) use crate::contact::{ErasedGaps, Gaps};
 pub(crate) use crate::contact_solver::{contact_error, no_response};
 pub(crate) use crate::state::Backup;
 pub(crate) use buffers::Buffers;

@@ -27,6 +27,7 @@ pub mod ranks;
 mod real;
 pub mod reduction;
 pub mod reference;
+mod rounding;
 mod scalar;
 mod simulation;
 mod sparse;

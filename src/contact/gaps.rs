@@ -34,14 +34,3 @@ impl<T: Real> std::fmt::Debug for ErasedGaps<'_, T> {
         f.write_str("Gaps")
     }
 }
-
-/// Relative rounding error ε^⅔ of a velocity. Below it, the last bit decides whether bodies that touch without force
-/// open or close.
-pub(crate) fn share_of_rounding<T: Real>() -> T {
-    T::of(T::epsilon().value().powf(2.0 / 3.0))
-}
-
-/// Rounding error of a sum whose terms have this magnitude.
-pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
-    T::of(64.0) * T::epsilon() * magnitude
-}

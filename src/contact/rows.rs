@@ -1,7 +1,7 @@
 //! Gaps between two searches: the rows of G, and the rates that do not come from them.
 
-use super::share_of_rounding;
 use crate::real::Real;
+use crate::rounding::share_of_rounding;
 use std::ops::Range;
 
 /// The parts of the gap rates that do not come from v and a: ġ = G v + `rate`, g̈ = G a + `acceleration`.

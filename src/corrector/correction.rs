@@ -9,10 +9,11 @@ mod restitution;
 
 use super::group_problem::Jumps;
 use super::{Buffers, Corrector, JumpProjection};
-use crate::contact::{ContactJacobian, ErasedGaps, GapRates, rounding};
+use crate::contact::{ContactJacobian, ErasedGaps, GapRates};
 use crate::contact_solver::{AdmissibleSet, ContactSolver, no_response};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::{MasslessBlock, Operator};
 use crate::state::{Backup, ContactState, Motion};
 use crate::system::{Linearity, System};

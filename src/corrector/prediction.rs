@@ -3,10 +3,11 @@
 
 use super::group_problem::Jumps;
 use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ErasedGaps, rounding};
+use crate::contact::{ContactId, ContactJacobian, ErasedGaps};
 use crate::contact_solver::{AdmissibleSet, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::state::Motion;
 
 /// One stage before it is solved, passed to [`Corrector::predict`](super::Corrector::predict).

@@ -1,11 +1,12 @@
 //! The contact problem of S = G M⁻¹ Gᵀ with friction, in total multipliers: the jumps already contain a part of them.
 
-use super::{JumpProjection, rounding};
+use super::JumpProjection;
 use crate::contact::{ContactId, ContactJacobian};
 use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, contact_error};
 use crate::dense::DenseCholesky;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 
 /// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
 pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {

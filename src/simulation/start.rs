@@ -19,12 +19,13 @@ pub(super) mod resumed;
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, rounding};
+use crate::corrector::{Block, Gaps, JumpProjection, Rubbing};
 use crate::error::{Error, Result};
 use crate::linear_solver::LinearSolver;
 use crate::mass::InverseMass;
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::build::scheme::Scheme;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::supports::put_initial_supports;

@@ -1,10 +1,10 @@
 //! Impulses that change the kinetic energy by a given amount.
 
-use super::{Correction, rounding};
+use super::Correction;
 use crate::corrector::buffers::Given;
-use crate::corrector::share_of_rounding;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::{rounding, share_of_rounding};
 
 impl<T: Real> Correction<'_, T> {
     /// Applies an impulse along a row that changes the kinetic energy relative to the obstacle by `energy`. With a

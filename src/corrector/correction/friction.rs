@@ -6,9 +6,10 @@ use super::{Correction, Jump, Pressed};
 use crate::contact::GapRates;
 use crate::contact_solver::AdmissibleSet;
 use crate::corrector::rubbing_problem::{Block, Rubbing};
-use crate::corrector::{Buffers, rounding, slides};
+use crate::corrector::{Buffers, slides};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 
 impl<T: Real> Correction<'_, T> {
     /// Whether any contact of the run has friction.

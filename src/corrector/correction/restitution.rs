@@ -2,9 +2,10 @@
 
 use super::{Correction, Pressed};
 use crate::contact::{ContactJacobian, GapRates};
-use crate::corrector::{Buffers, rounding, share_of_rounding};
+use crate::corrector::Buffers;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::{rounding, share_of_rounding};
 
 /// The rebounding contacts of a stage. One entry per row of G unless noted.
 #[derive(Debug, Default)]

@@ -2,9 +2,10 @@
 
 use crate::contact::{ContactJacobian, GapRates, Measure};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
-use crate::corrector::{Gaps, rounding};
+use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::{rounding, touching};
 use crate::simulation::build::program::{CompiledStage, ContactTarget};
 use crate::simulation::operator::Operator;
 use crate::simulation::rows::constraints::Constraints;
@@ -215,7 +216,7 @@ impl<T: Real> ContactRowsWork<T> {
         for row in (0..constraints.len()).filter(|&row| constraints.law(row).reads_start()) {
             let approach = T::of(h) * (g.product(row, &start.v) + rates[row].rate).abs();
             let rounded = constraints.gap_rounding(row, g.magnitude(row, &start.u), start_gap[row]);
-            start_tolerance[row] = rounded + sliver(approach);
+            start_tolerance[row] = rounded + touching(approach);
             hover[row] = (start_gap[row] - rounded).max(T::zero());
             measure[row] = Measure::Undecided;
         }
@@ -235,7 +236,7 @@ impl<T: Real> ContactRowsWork<T> {
             }
             // The gap of a resting contact is small compared with the displacement that its force prevents, from the
             // gap at the start to the gap of the free motion.
-            let closed = start_gap[row] <= start_tolerance[row] + sliver((y[row] - start_gap[row]).abs());
+            let closed = start_gap[row] <= start_tolerance[row] + touching((y[row] - start_gap[row]).abs());
             *measure = constraints.law(row).measure(closed);
         }
     }
@@ -396,9 +397,4 @@ impl<T: Real> Level<'_, T> {
             Some(rows) => (self.clock.at(rows.at), target),
         }
     }
-}
-
-/// The gap below which a contact counts as closed: 1e-10 of the displacement in the step, plus its rounding.
-fn sliver<T: Real>(way: T) -> T {
-    T::of(1e-10) * way + rounding(way)
 }

@@ -1,9 +1,10 @@
 //! Gaps of all rows and their rates, at the current motion and at other motions.
 
 use crate::contact::{ContactLaw, GapRates, Rates, Tangents, Variation};
-use crate::corrector::{Gaps, rounding};
+use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::part::{Part, gather, of};
 

@@ -6,9 +6,10 @@
 //! corrections remove contact forces from the accelerations. It is measured along the rows along which friction acts.
 
 use crate::contact::{ContactJacobian, GapRates, Tangents};
-use crate::corrector::{rounding, slides};
+use crate::corrector::slides;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::build::program::{CompiledStage, ContactTarget};
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::contact_rows::{ContactRowsWork, Part};

@@ -17,9 +17,10 @@ pub(in crate::simulation) mod solve;
 
 use crate::contact::{ContactJacobian, ContactLaw, Course};
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Gaps, rounding};
+use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::build::program::CompiledStage;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::interface::{InterfaceWork, advance, keep};

@@ -1,9 +1,9 @@
 //! Dofs without mass, whose displacements follow from static balance with the others: their part of K, factorized.
 
-use crate::corrector::rounding;
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::build::program::CompiledStage;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::responses::Unit;

@@ -1,9 +1,10 @@
 //! Dofs without mass in an explicit stage: brought into static balance before the other dofs are solved for.
 
 use crate::contact::Candidates;
-use crate::corrector::{Gaps, rounding};
+use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::rows::contact_rows::Part;
 use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::contact::{ContactStep, ContactWork};

@@ -3,10 +3,11 @@
 
 use crate::contact::{Candidates, ContactJacobian, Course};
 use crate::contact_solver::{ContactProblem, ContactSolver};
-use crate::corrector::{Gaps, contact_error, rounding};
+use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
 use crate::linear_solver::Factorization;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::responses::Unit;
 use crate::simulation::rows::constraints::Constraints;

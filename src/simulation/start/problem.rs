@@ -2,9 +2,10 @@
 
 use crate::contact::{ContactId, ContactJacobian, ContactLaw, Course, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
-use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, rounding, slides};
+use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, slides};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::supports::finite_supports;
 use crate::state::{ContactState, Motion};

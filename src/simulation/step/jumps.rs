@@ -2,8 +2,9 @@
 //! makes no jump.
 
 use crate::contact::ContactJacobian;
-use crate::corrector::{Gaps, rounding, share_of_rounding};
+use crate::corrector::Gaps;
 use crate::real::Real;
+use crate::rounding::{rounding, share_of_rounding};
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::stage::contact::ContactWork;
 use crate::state::{ContactState, Motion};

@@ -7,9 +7,10 @@
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::no_response;
-use crate::corrector::{JumpProjection, rounding};
+use crate::corrector::JumpProjection;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::watch::energy::StepBooks;
 use crate::state::State;

@@ -1,9 +1,10 @@
 //! Curved rows in the contact of a stage: linearized again at its result, and compared with the rows solved for.
 
 use crate::contact::{Candidates, ContactJacobian};
-use crate::corrector::{Gaps, rounding};
+use crate::corrector::Gaps;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::interface::keep;
 use crate::simulation::rows::contact_rows::{ContactRowsWork, Level};

@@ -2,10 +2,11 @@
 
 use crate::contact::{Course, Measure};
 use crate::contact_solver::{ContactFailure, ContactProblem};
-use crate::corrector::{Gaps, contact_error, rounding};
+use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::interface::InterfaceWork;
 use crate::simulation::rows::contact_rows::{ContactRowsWork, Part};
