@@ -4,7 +4,9 @@
 //! - `gaps`, `rate_differences`: gaps of all rows and their rates.
 //! - `kept_depths`: limits the penetration recovered in a step.
 //! - `contact_rows`: the quantity that each gap row constrains in a stage; `slip`: the same for tangential rows;
-//!   `curved_rows`: gaps that are not linear in the displacements.
+//!   `curved_rows`: gaps that are not linear in the displacements; `massless_rows`: rows on dofs without mass.
+//! - `row_state`: whether a row may carry a force, is in the contact problem, and is closed.
+//! - `problem_rows`: the rows of the contact problem, and its data.
 
 pub(super) mod constraints;
 pub(super) mod contact_rows;
@@ -12,6 +14,9 @@ pub(super) mod curved_rows;
 pub(super) mod gaps;
 pub(super) mod kept_depths;
 pub(super) mod laws;
+pub(super) mod massless_rows;
 pub(super) mod part;
+pub(super) mod problem_rows;
 pub(super) mod rate_differences;
+pub(super) mod row_state;
 pub(super) mod slip;

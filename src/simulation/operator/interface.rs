@@ -18,7 +18,7 @@ pub(crate) struct InterfaceWork<T> {
     pub(crate) free: Vec<T>,
     pub(crate) tried: Vec<T>,
     /// Displacements where the gaps of curved rows were linearized last.
-    pub(crate) followed: Vec<T>,
+    pub(crate) linearized_at: Vec<T>,
     /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
     pub(crate) response: Vec<T>,
 }
@@ -35,7 +35,7 @@ impl<T: Real> InterfaceWork<T> {
             target: zero(),
             free: zero(),
             tried: zero(),
-            followed: zero(),
+            linearized_at: zero(),
             response: zero(),
         }
     }

@@ -9,17 +9,13 @@
 use crate::contact::ContactJacobian;
 use crate::real::Real;
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::stage::contact::mixing::Mixing;
 
 /// Maximum number of linearizations of curved rows.
-pub(crate) const FOLLOWED: usize = 48;
+pub(crate) const LINEARIZATIONS: usize = 48;
 
 /// Number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
 /// other, and either pushes it to the other side.
 const LONG: usize = 12;
-
-/// Number of linearizations after which Anderson mixing starts. Nearly all stages converge or alternate before that.
-pub(crate) const SLOW: usize = 18;
 
 /// The relative [`Miss`] of gaps and forces at which the iteration has converged, in units of the rounding.
 const FIT: f64 = 64.0;
@@ -79,19 +75,22 @@ impl Miss {
         self.gap.max(self.force)
     }
 
-    /// Whether the iteration may end after `passes` linearizations: the miss is within rounding; or small and no
+    /// Whether the iteration may end after `linearizations` linearizations: the miss is within rounding; or small and no
     /// longer decreasing; or alternating; or small at the last linearization of a step that cannot be halved.
     /// `before` and `earlier` are the misses of the last two linearizations.
-    pub(crate) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], may_halve: bool) -> bool {
+    pub(crate) fn has_converged<T: Real>(
+        self,
+        linearizations: usize,
+        [before, earlier]: [Self; 2],
+        may_halve: bool,
+    ) -> bool {
         let fit = FIT * T::epsilon().value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let force = if passes > LONG { TIRED } else { NEAR };
-        let near = within(NEAR, force) && (now > 0.25 * before.largest() || passes == FOLLOWED);
-        // With Anderson mixing a miss may repeat at random.
-        let alternates =
-            (LONG + 1..=SLOW).contains(&passes) && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
-        let as_near_as_may_be = passes == FOLLOWED && !may_halve && within(AT_EDGE, TIRED);
+        let force = if linearizations > LONG { TIRED } else { NEAR };
+        let near = within(NEAR, force) && (now > 0.25 * before.largest() || linearizations == LINEARIZATIONS);
+        let alternates = linearizations > LONG && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
+        let as_near_as_may_be = linearizations == LINEARIZATIONS && !may_halve && within(AT_EDGE, TIRED);
         now <= fit || near || alternates || as_near_as_may_be
     }
 }
@@ -107,11 +106,9 @@ pub(crate) struct CurvedRowsWork<T> {
     /// Gaps evaluated where the balance holds, one per candidate.
     pub(crate) gaps: Vec<T>,
     /// Gaps and slips predicted by the rows of the last solution, one per row.
-    pub(crate) foreseen: Vec<T>,
+    pub(crate) predicted: Vec<T>,
     /// The largest difference after the last linearization.
     pub(crate) worst: Worst,
-    /// Anderson mixing of slowly converging linearizations; present if rows may move within a step.
-    pub(crate) mixing: Option<Box<Mixing<T>>>,
     /// Whether the step may be halved instead.
     pub(crate) may_halve: bool,
 }
@@ -123,9 +120,8 @@ impl<T: Real> CurvedRowsWork<T> {
             version: 0,
             apart: false,
             gaps: Vec::new(),
-            foreseen: Vec::new(),
+            predicted: Vec::new(),
             worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: NEAR },
-            mixing: None,
             may_halve: false,
         }
     }
@@ -133,7 +129,7 @@ impl<T: Real> CurvedRowsWork<T> {
     /// Memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.gaps.resize(rows, T::zero());
-        self.foreseen.resize(rows, T::zero());
+        self.predicted.resize(rows, T::zero());
         if self.rows.rows() == 0 {
             self.rows = ContactJacobian::with_capacity(rows, entries);
         }
@@ -176,14 +172,16 @@ mod tests {
     #[test]
     fn forces_may_miss_more_once_rows_are_tired() {
         let miss = |force| Miss { gap: 1e-9, force };
-        let settled = |force, passes| miss(force).is_settled::<f64>(passes, [miss(2.0 * force), miss(force)], true);
-        for passes in [1, 2, LONG] {
-            assert!(settled(0.5 * NEAR, passes) && !settled(0.5 * TIRED, passes), "{passes}");
+        let settled = |force, linearizations| {
+            miss(force).has_converged::<f64>(linearizations, [miss(2.0 * force), miss(force)], true)
+        };
+        for linearizations in [1, 2, LONG] {
+            assert!(settled(0.5 * NEAR, linearizations) && !settled(0.5 * TIRED, linearizations), "{linearizations}");
         }
-        for passes in [SLOW + 1, FOLLOWED] {
-            assert!(settled(0.5 * TIRED, passes) && !settled(2.0 * TIRED, passes), "{passes}");
+        for linearizations in [LONG + 1, LINEARIZATIONS] {
+            assert!(settled(0.5 * TIRED, linearizations) && !settled(2.0 * TIRED, linearizations), "{linearizations}");
         }
         // Not while each linearization still reduces it to less than a quarter.
-        assert!(!miss(0.5 * TIRED).is_settled::<f64>(SLOW + 1, [miss(0.1), miss(0.2)], true));
+        assert!(!miss(0.5 * TIRED).has_converged::<f64>(LONG + 1, [miss(0.1), miss(0.2)], true));
     }
 }
