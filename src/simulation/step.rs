@@ -48,7 +48,7 @@ impl<T: Real> Simulation<'_, T> {
             contact_solver.reserve(constraints.room());
         }
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
-        constraints.measure_from_kept(&mut work.contact.trial.gap);
+        constraints.add_kept(&mut work.contact.trial.gap);
         if let Some(ledger) = ledger {
             ledger.begin((constraints, g), state, &work.contact.trial.lambda)?;
         }
@@ -202,7 +202,7 @@ impl<T: Real> Simulation<'_, T> {
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
-        constraints.measure_from_surfaces(&mut work.contact.trial.gap);
+        constraints.subtract_kept(&mut work.contact.trial.gap);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
         work.contact.impulses.accept();
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
