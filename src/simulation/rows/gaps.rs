@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::simulation::rows::constraints::{Constraints, Scratch};
-use crate::simulation::rows::part::{Part, gather, of};
+use crate::simulation::rows::part::{gather, of};
 
 impl<T: Real> Constraints<'_, T> {
     /// Gaps of all rows, refusing NaN and infinity.
@@ -62,24 +62,22 @@ impl<T: Real> Constraints<'_, T> {
             return Ok(());
         }
         let Self { parts, scratch: Scratch { local, differences, .. }, ahead, .. } = self;
-        let Part { constraint, dofs, contacts, variation, place, rates: said, .. } = &mut parts[number];
-        if *said == Some(Rates::Zero) {
+        let part = &mut parts[number];
+        if part.rates == Some(Rates::Zero) {
             out.fill(GapRates::default());
             return Ok(());
         }
-        let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
-        let answer = constraint.rates(t, u, v, out).map_err(|error| of(number, error))?;
-        *said = Some(answer);
+        let (u, v) = (gather(&part.dofs, u, &mut local.u), gather(&part.dofs, v, &mut local.v));
+        let answer = part.constraint.rates(t, u, v, out).map_err(|error| of(number, error))?;
+        part.rates = Some(answer);
         match answer {
-            Rates::Given => {}
-            Rates::Zero => out.fill(GapRates::default()),
-            Rates::Differences => {
-                let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
-                let found = differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out);
-                found.map_err(|error| of(number, error))?;
+            Rates::Given => Ok(()),
+            Rates::Zero => {
+                out.fill(GapRates::default());
+                Ok(())
             }
+            Rates::Differences => differences.find(part, (t, u, v), *ahead, out).map_err(|error| of(number, error)),
         }
-        Ok(())
     }
 
     /// The parts of the slip rates that do not come from v and a, one entry per tangential row.

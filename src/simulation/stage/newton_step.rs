@@ -151,13 +151,14 @@ impl<T: Real> StageSolve<'_, '_, T> {
             (Some(_), Some(balance)) => &*balance,
             _ => &*self.new,
         };
-        let Host { system, together } = &mut self.host;
         match (&mut newton.path, self.past.first()) {
             (Some(path), Some(from)) if self.stage.along_path => {
-                path.force((&mut **system, together), t, [&from.u, &self.new.u, &motion.u], &motion.v, increment)?;
+                let along = Path { from: &from.u, to: &self.new.u, mean: &motion.u };
+                path.force(&mut self.host, t, along, &motion.v, increment)?;
             }
-            _ => system.force(t, &motion.u, &motion.v, increment)?,
+            _ => self.host.system.force(t, &motion.u, &motion.v, increment)?,
         }
+        let Host { system, together } = &mut self.host;
         let clear_supports = |increment: &mut [T]| supports.dofs.iter().for_each(|&dof| increment[dof] = T::zero());
         clear_supports(increment);
         let force = together.owned(increment.len()).map(|part| square(&increment[part])).sum();
