@@ -18,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::largest_compliance;
 use crate::simulation::operator::contact_path::{ContactPath, analyze, condensation, respond};
 use crate::simulation::operator::matrix::EffectiveMatrix;
 use crate::simulation::operator::responses::{Responses, Unit};
@@ -221,8 +222,7 @@ impl<T: Real> Operator<T> {
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
     /// `versions` is the number of versions so far.
     ///
-    /// The compliance of a power law at first touch is infinite. It is limited to ε⁻⁴ times the diagonal entry of W:
-    /// the effect of such a spring is lost to rounding, whatever the unit.
+    /// The compliance of a power law at first touch is infinite. It is limited by a multiple of the diagonal entry of W.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,
@@ -237,8 +237,7 @@ impl<T: Real> Operator<T> {
             self.assemble(g, rows, is_known)?;
         }
         let Delassus { values, diagonal, version, .. } = &mut self.delassus;
-        let square = T::epsilon() * T::epsilon();
-        let most = (square * square).recip();
+        let most = largest_compliance::<T>();
         for (k, &own) in diagonal.iter().enumerate() {
             let entry = &mut values[k * rows.len() + k];
             let most = if own > T::zero() { most * own } else { T::infinity() };

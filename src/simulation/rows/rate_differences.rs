@@ -3,6 +3,7 @@
 use crate::contact::{GapRates, Variation};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::rows::part::Part;
 use crate::state::resolution;
 
@@ -76,11 +77,11 @@ impl<T: Real> RateDifferences<T> {
         gaps(single, T::zero(), after)?;
         let size = |row: usize| -> T {
             let sum: T = contacts.row(row).map(|(place, weight)| (weight * u[place]).abs()).sum();
-            T::of(16.0) * T::epsilon() * (sum + contacts.magnitude(row))
+            rounding(sum + contacts.magnitude(row))
         };
         let rounded = |row: usize, gaps: [T; 3]| {
             let most = gaps.into_iter().fold(T::zero(), |most, gap| most.max(gap.abs()));
-            size(row) + T::of(16.0) * T::epsilon() * most
+            size(row) + rounding(most)
         };
         for (row, out) in out.iter_mut().enumerate() {
             let change = after[row] - before[row];

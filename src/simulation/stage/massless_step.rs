@@ -4,7 +4,7 @@ use crate::contact::Candidates;
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{STATIC_INCREMENT, rounding};
 use crate::simulation::rows::massless_rows::Problem;
 use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::vectors::StageVectors;
@@ -12,9 +12,6 @@ use crate::simulation::stage::{Host, StageSolve};
 
 /// Maximum number of linearizations of rows.
 const LINEARIZATIONS: usize = 20;
-
-/// The largest increment at which rows have converged, relative to the first one.
-const CONVERGED: f64 = 1e-9;
 
 impl<'a, T: Real> StageSolve<'_, 'a, T> {
     /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact.
@@ -38,7 +35,7 @@ impl<'a, T: Real> StageSolve<'_, 'a, T> {
             let moved = self.constraints.follow(self.new.t, &self.new.u, self.g)?;
             let StageVectors { increment, balance, .. } = &mut *self.vectors;
             let forces = &self.contact.interface.forces;
-            let converged = iteration > 0 && largest <= rounding(scale) + T::of(CONVERGED) * first;
+            let converged = iteration > 0 && largest <= rounding(scale) + T::of(STATIC_INCREMENT) * first;
             if moved == Candidates::Unchanged || converged {
                 for &(dof, place) in &block.massive {
                     increment[dof] += forces[place];

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::SMALL_INCREMENT;
 use crate::simulation::build::program::ScaledRows;
 use crate::simulation::operator::tangent::{At, TangentOf};
 use crate::simulation::stage::newton::{Iteration, NewtonWork, TangentUpdate};
@@ -13,6 +14,9 @@ use crate::system::Path;
 
 /// The smallest share of an increment in a line search.
 const SHORTEST: f64 = 0.125;
+
+/// The decrease of the residual that a line search demands, over the share of the increment (Armijo).
+const DESCENT: f64 = 1e-4;
 
 /// Norms at a trial state.
 #[derive(Clone, Copy)]
@@ -104,7 +108,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let earlier = newton.residuals.len().checked_sub(within + 1);
         let stays = earlier.is_some_and(|earlier| norms.residual >= share * newton.residuals[earlier]);
         let (moved, resolution) = (weight.value().abs() * size, T::epsilon().value() * values);
-        let small = size <= displacement * whole || moved <= 1e4 * resolution;
+        let small = size <= displacement * whole || moved <= SMALL_INCREMENT * resolution;
         Ok(met || moved <= resolution || small && (stays || norms.residual <= force * newton.residuals[0]))
     }
 
@@ -239,7 +243,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let may_shorten = newton.settings.line_search && share > SHORTEST;
             match found {
                 Ok(found) => {
-                    let falls = found.residual <= (1.0 - 1e-4 * share) * before.residual;
+                    let falls = found.residual <= (1.0 - DESCENT * share) * before.residual;
                     if !may_shorten || falls || found.residual <= force * found.scale() {
                         return Ok(Some((share, found)));
                     }

@@ -4,10 +4,10 @@ use crate::contact::{Candidates, ContactJacobian};
 use crate::corrector::Gaps;
 use crate::error::Result;
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{ROUNDING_OF_ROWS, rounding};
 use crate::simulation::operator::interface::keep;
 use crate::simulation::rows::contact_rows::ContactRowsWork;
-use crate::simulation::rows::curved_rows::{Miss, NEAR, NOISE, Worst};
+use crate::simulation::rows::curved_rows::{Miss, Worst};
 use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::contact::ContactWork;
 
@@ -204,5 +204,5 @@ impl<T: Real> StageSolve<'_, '_, T> {
 /// A miss beyond its tolerance, relative to a scale. Where d moves nothing, the tolerance is the only scale left.
 fn share_beyond<T: Real>(miss: T, tolerance: T, scale: T) -> f64 {
     let beyond = miss - tolerance;
-    if beyond > T::zero() { (beyond / (scale + T::of(NOISE / NEAR) * tolerance)).value() } else { 0.0 }
+    if beyond > T::zero() { (beyond / (scale + T::of(ROUNDING_OF_ROWS) * tolerance)).value() } else { 0.0 }
 }

@@ -6,7 +6,7 @@ use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{half_digits, rounding};
 use crate::simulation::operator::interface::InterfaceWork;
 use crate::simulation::rows::contact_rows::ContactRowsWork;
 use crate::simulation::rows::problem_rows::ProblemRows;
@@ -45,7 +45,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             // Newton's method ends when an iteration does not reduce a small residual: this residual comes from an
             // iterative contact solver, as for friction.
-            let stagnates = worst.1 <= T::epsilon().sqrt() * deepest && worst.1 > T::of(0.75) * before.1;
+            let stagnates = worst.1 <= half_digits::<T>() * deepest && worst.1 > T::of(0.75) * before.1;
             if (worst.1 == T::zero() || stagnates) && !augments {
                 return self.add_response();
             }

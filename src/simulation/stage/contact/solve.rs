@@ -40,7 +40,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             self.operator.follow(self.contact.rows.curved.version(self.constraints));
             let miss = self.measure_miss()?;
-            if miss.has_converged::<T>(iteration, before, self.contact.rows.curved.may_halve) {
+            if miss.has_converged::<T>(iteration, before) {
                 return Ok(true);
             }
             before = [miss, before[0]];
