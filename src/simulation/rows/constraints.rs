@@ -193,7 +193,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         let Self { parts, scratch: Scratch { local, .. }, reading, .. } = self;
         for (number, part) in parts.iter_mut().enumerate().filter(|(_, part)| part.variation != Variation::Never) {
             let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
-            part.settle(motion.t, u);
+            part.store_place(motion.t, u);
             let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
             // The flag stays set if a later part fails: the next successful search reads the rows again.
             part.stale |= found == Candidates::Changed;

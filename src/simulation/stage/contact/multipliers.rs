@@ -140,11 +140,11 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let ProblemRows { rows, own, offset, sets, tolerance, scale, multipliers, .. } = problem;
         own.clear();
         own.extend(rows.iter().map(|&row| laws.compliance[row] / weight[row]));
-        let InterfaceWork { pressing, response, .. } = interface;
+        let InterfaceWork { problem_forces, response, .. } = interface;
         AppliedRows { g: curved.forces(g), rows, own, offset, sets, tolerance }.solve(
             operator,
             &mut **solver,
-            [pressing, response],
+            [problem_forces, response],
             scale,
             multipliers,
         )
@@ -190,9 +190,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
             iterations = iterations.max(spent);
         }
         let ContactWork { rows, interface, .. } = &mut *self.contact;
-        let InterfaceWork { pressing, response, .. } = interface;
+        let InterfaceWork { problem_forces, response, .. } = interface;
         let (forces, problem) = (rows.curved.forces(self.g), &rows.problem);
-        self.operator.answer(forces, (&problem.rows, &problem.multipliers), pressing, response);
+        self.operator.answer(forces, (&problem.rows, &problem.multipliers), problem_forces, response);
         Ok(iterations)
     }
 
