@@ -33,7 +33,7 @@ pub(crate) fn touching<T: Real>(way: T) -> T {
 
 /// Rows linearized at the result of a stage are the rows solved for if gaps, relative to their change by the increment,
 /// and forces, relative to their norm, differ by at most this share and no longer come closer.
-pub(crate) const SAME_ROWS: f64 = 1e-8;
+pub(crate) const SAME_ROWS: f64 = 1e-7;
 
 /// The part of a tolerance that the difference of a gap is compared with where the increment moves nothing, over
 /// [`SAME_ROWS`].
@@ -41,7 +41,7 @@ pub(crate) const ROUNDING_OF_ROWS: f64 = 8.0 / SAME_ROWS;
 
 /// A node at an edge has the normal of one facet or the other, and either pushes it to the other one. Rows alternate so
 /// if gaps differ by at most this share of their change,
-pub(crate) const ALTERNATING_GAPS: f64 = 1e-6;
+pub(crate) const ALTERNATING_GAPS: f64 = 1e-5;
 
 /// forces by at most this share, the angle between two valid normals,
 pub(crate) const ALTERNATING_FORCES: f64 = 0.1;
