@@ -41,7 +41,7 @@ pub(crate) const ROUNDING_OF_ROWS: f64 = 8.0 / SAME_ROWS;
 
 /// A node at an edge has the normal of one facet or the other, and either pushes it to the other one. Rows alternate so
 /// if gaps differ by at most this share of their change,
-pub(crate) const ALTERNATING_GAPS: f64 = 1e-4;
+pub(crate) const ALTERNATING_GAPS: f64 = 1e-5;
 
 /// forces by at most this share, the angle between two valid normals,
 pub(crate) const ALTERNATING_FORCES: f64 = 0.1;
