@@ -1,7 +1,7 @@
 //! Integrators, corrections and mass matrices against each other: two bars that collide, bars of different stiffness
 //! and length, a bar that bounces, a soft disc.
 //!
-//! `cargo run --release --example stabilization_matrix` prints the tables of `docs/corrections.md` and writes them, a
+//! `cargo run --release --example stabilization_matrix` prints the tables of `docs/measured/corrections.md` and writes them, a
 //! figure and all numbers (`stabilization_matrix.csv`); with `--quick` meshes are coarse, phases two, and times are not
 //! measured.
 //!
