@@ -17,6 +17,29 @@ pub(crate) fn share_of_rounding<T: Real>() -> T {
     T::of(T::epsilon().value().powf(2.0 / 3.0))
 }
 
+/// The share √ε, half of the digits. Less cannot be told from rounding where rounding enters by its root.
+pub(crate) fn half_of_digits<T: Real>() -> T {
+    T::epsilon().sqrt()
+}
+
+// Contact solvers.
+
+/// The share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ: the rounding of 64 terms.
+pub(crate) fn asymmetry<T: Real>() -> T {
+    rounding(T::of(64.0))
+}
+
+/// The share ε^⅖ of its motion without contact by which a gap may be violated by rounding, however large the forces of
+/// badly conditioned rows are.
+pub(crate) fn conditioned_share<T: Real>() -> T {
+    T::of(T::epsilon().value().powf(0.4))
+}
+
+/// Gaps below this have lost their digits, as of motions that have died out: they need no solve. A length.
+pub(crate) fn smallest_gap<T: Real>() -> T {
+    T::min_positive_value() / T::epsilon()
+}
+
 // Contact.
 
 /// The gap below which a contact touches: 1e-10 of the displacement in the step, plus its rounding. A length.

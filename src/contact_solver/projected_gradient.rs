@@ -187,8 +187,8 @@ impl<T: Real> ContactSolver<T> for ProjectedGradient<T> {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let Self { settings, memory } = self;
-        let mut acceptance = settings.begin(problem, multipliers)?;
         problem.check_symmetric()?;
+        let acceptance = settings.begin(problem, false, multipliers)?;
         let bound = memory.begin(problem, multipliers);
         let (mut lipschitz, mut age) = (T::one(), T::one());
         for iteration in 0..settings.iterations {
