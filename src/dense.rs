@@ -57,13 +57,14 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
-    /// Memory for [`factorize_general`](Self::factorize_general) with this many rows.
-    pub(crate) fn reserve_general(&mut self, size: usize) {
-        let Self { l, first, diagonal, independent, .. } = self;
-        l.reserve((size * size).saturating_sub(l.len()));
-        diagonal.reserve(size.saturating_sub(diagonal.len()));
-        for list in [first, independent] {
-            list.reserve(size.saturating_sub(list.len()));
+    /// Memory for [`factorize_general`](Self::factorize_general) only.
+    pub(crate) fn with_general_capacity(size: usize) -> Self {
+        Self {
+            l: Vec::with_capacity(size * size),
+            first: Vec::with_capacity(size),
+            diagonal: Vec::with_capacity(size),
+            independent: Vec::with_capacity(size),
+            ..Self::default()
         }
     }
 

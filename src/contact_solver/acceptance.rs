@@ -134,11 +134,14 @@ impl<'a, T: Real> Acceptance<'a, T> {
 
     /// The same for a problem without friction, with the evaluated gaps of these multipliers.
     pub(super) fn accepts_gaps(&self, gaps: &Gaps<T>, multipliers: &[T]) -> bool {
-        let problem = self.problem;
-        (0..problem.size()).all(|i| {
-            let miss = problem.sets[i].residual(&gaps.y[i..=i], &multipliers[i..=i], &[problem.delassus(i, i)]);
-            self.admits(i, miss, || gaps.rounding(problem, i))
-        })
+        let mut misses = self.misses(gaps, multipliers).enumerate();
+        misses.all(|(i, miss)| self.admits(i, miss, || gaps.rounding(self.problem, i)))
+    }
+
+    /// The residual of each row of a problem without friction, with the evaluated gaps of these multipliers.
+    pub(super) fn misses(&self, gaps: &Gaps<T>, multipliers: &[T]) -> impl Iterator<Item = T> {
+        let rows = self.problem.sets.iter().zip(&gaps.y).zip(multipliers).enumerate();
+        rows.map(|(i, ((set, &y), &lambda))| set.residual(&[y], &[lambda], &[self.problem.delassus(i, i)]))
     }
 
     /// Whether the residual of every row is a negligible contradiction: at most √ε of the motion that the other rows

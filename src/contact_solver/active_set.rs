@@ -24,18 +24,19 @@ use crate::rounding::half_of_digits;
 /// ([`solve_applied`](ContactSolver::solve_applied)) use block exchanges only and return an error if these do not
 /// end.
 ///
-/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite: the active rows then
-/// get the multipliers of least norm, which share a force evenly. If the exchanges do not end on such a W, the
-/// problem is solved by proximal steps, each a positive definite problem (Rockafellar, SIAM J. Control Optim. 14,
-/// 1976), and if these do not end, by [`Pivoting`]. Contradictory rows are an error that names them. Nearly dependent
-/// rows may leave pivots of W that are rounding; multipliers could then grow without bound and seem to solve an
-/// infeasible problem. Therefore a pivot must exceed the rounding of the combination of rows that it measures, and in
-/// an accepted solution every row misses complementarity by less than a small share of its motion without contact,
-/// whatever the multipliers. If neither the proximal steps nor pivoting solve rows that differ by a small angle, the
-/// result of the steps is accepted if no row misses more than √ε of that motion.
+/// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite. If active rows depend
+/// on one another, the same exchanges solve a sequence of proximal problems with W + d I, each positive definite
+/// (Rockafellar, SIAM J. Control Optim. 14, 1976), with a shift d of ε^¼, later √ε, of the largest W_ii. They start at
+/// zero and so find the multipliers of least norm, which share a force evenly. The fallback, if the steps stop to
+/// converge, is [`Pivoting`]; if this fails too, the rows contradict each other: an error names them.
 ///
-/// An unsymmetric W, from an unsymmetric effective matrix, is factorized by LU: this costs twice the work, and
-/// redundant rows always need proximal steps.
+/// Nearly dependent rows may leave pivots of W that are rounding; multipliers could then grow without bound and seem to
+/// solve an infeasible problem. Therefore a pivot must exceed the rounding of the combination of rows that it measures,
+/// and in an accepted solution every row misses complementarity by less than a small share of its motion without
+/// contact, whatever the multipliers. Rows that differ by a small angle and contradict each other by at most √ε of that
+/// motion get the result of the proximal steps.
+///
+/// An unsymmetric W, from an unsymmetric effective matrix, is factorized by LU, which costs twice the work.
 ///
 /// Problems with friction ([`AdmissibleSet::Cone2`], [`AdmissibleSet::Cone3`]) are solved by semismooth Newton
 /// iterations on the conditions of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991), with the states
@@ -158,8 +159,12 @@ impl<T: Real> ActiveSet<T> {
         let least = half_of_digits::<T>();
         let (mut share, mut before) = (least.sqrt(), T::infinity());
         for _ in 0..PROXIMAL_STEPS {
-            iterations += self.exchange(problem, share * largest, multipliers)?.0;
-            let (_, residual) = problem.residual(multipliers);
+            let (count, is_solved) = self.exchange(problem, share * largest, multipliers)?;
+            iterations += count;
+            if !is_solved {
+                break;
+            }
+            let residual = acceptance.misses(&self.gaps, multipliers).fold(T::zero(), T::max);
             let converges = residual < T::of(0.1) * before;
             if !converges && acceptance.accepts_gaps(&self.gaps, multipliers) {
                 return Ok(iterations);
@@ -222,6 +227,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         let acceptance = Settings::default().begin(problem, known, multipliers)?;
         if !known {
             self.structure.find(problem);
+            self.equations.forget();
         }
         if problem.has_cones() {
             return self.cones.solve(&acceptance, self.structure.symmetry(), multipliers);

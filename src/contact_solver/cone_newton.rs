@@ -9,8 +9,8 @@ use crate::real::Real;
 use crate::rounding::rounding;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), started from sweeps
-/// over the blocks. On redundant rows it may not end; the problem is then solved by proximal steps, each with a positive
-/// definite W.
+/// over the blocks. On redundant rows it may not end; the problem is then solved by proximal steps, each with a
+/// positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
     sweeps: Sweeps<T>,
@@ -23,10 +23,9 @@ pub(super) struct ConeNewton<T> {
     y: Vec<T>,
     tried: Vec<T>,
     found: Vec<T>,
-    /// A proximal problem: its W, offset and center.
+    /// A proximal problem: its W and offset.
     shifted: Vec<T>,
     offset: Vec<T>,
-    center: Vec<T>,
 }
 
 /// Sweeps before Newton's method, at least, and in a proximal step whose Newton iterations do not end.
@@ -63,10 +62,12 @@ impl<T: Real> ConeNewton<T> {
         multipliers: &mut [T],
     ) -> Result<usize, ContactFailure<T>> {
         let size = acceptance.problem().size();
-        self.make_room(size);
+        if self.y.capacity() < size {
+            *self = Self::with_capacity(size);
+        }
         let mut spent = 0;
-        // A sweep costs about 3/n of a Newton iteration: first up to half an iteration's worth of sweeps, as long as they
-        // converge.
+        // A sweep costs about 3/n of a Newton iteration: first up to half an iteration's worth of sweeps, as long as
+        // they converge.
         let sweeps = FIRST_SWEEPS.max(size / 6);
         let schedule = Schedule { omega: T::one(), sweeps, impatient: true };
         if self.sweeps.solve(acceptance, symmetry, schedule, &mut spent, multipliers)
@@ -78,17 +79,19 @@ impl<T: Real> ConeNewton<T> {
         Err(acceptance.failure(spent, multipliers))
     }
 
-    /// Grows the memory to at least this many rows.
-    fn make_room(&mut self, size: usize) {
-        let Self { factor, statuses, rows, matrix, right, y, tried, found, .. } = self;
-        if matrix.capacity() < size * size {
-            factor.reserve_general(size);
-            matrix.reserve(size * size - matrix.len());
-        }
-        statuses.reserve(size.saturating_sub(statuses.len()));
-        rows.reserve(size.saturating_sub(rows.len()));
-        for values in [right, y, tried, found] {
-            values.reserve(size.saturating_sub(values.len()));
+    fn with_capacity(size: usize) -> Self {
+        let reals = || Vec::with_capacity(size);
+        Self {
+            sweeps: Sweeps::with_capacity(size),
+            factor: DenseCholesky::with_general_capacity(size),
+            statuses: Vec::with_capacity(size),
+            rows: Vec::with_capacity(size),
+            matrix: Vec::with_capacity(size * size),
+            right: reals(),
+            y: reals(),
+            tried: reals(),
+            found: reals(),
+            ..Self::default()
         }
     }
 
@@ -139,12 +142,9 @@ impl<T: Real> ConeNewton<T> {
     ) -> bool {
         let problem = acceptance.problem();
         let size = problem.size();
-        let [mut shifted, mut offset, mut center] =
-            [&mut self.shifted, &mut self.offset, &mut self.center].map(std::mem::take);
+        let [mut shifted, mut offset] = [&mut self.shifted, &mut self.offset].map(std::mem::take);
         let (mut share, mut solved) = (T::of(FIRST_SHARE), false);
         for _ in 0..PROXIMAL_STEPS {
-            center.clear();
-            center.extend_from_slice(multipliers);
             shifted.clear();
             shifted.extend_from_slice(problem.delassus);
             offset.clear();
@@ -154,7 +154,7 @@ impl<T: Real> ConeNewton<T> {
                 let own = rows.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
                 for row in rows {
                     shifted[row * size + row] += share * own;
-                    offset[row] -= share * own * center[row];
+                    offset[row] -= share * own * multipliers[row];
                 }
             }
             let step = ContactProblem::of(&shifted, &offset, problem.sets, problem.tolerance, 0);
@@ -173,7 +173,7 @@ impl<T: Real> ConeNewton<T> {
                 false => share / T::of(SHRINK * SHRINK),
             };
         }
-        (self.shifted, self.offset, self.center) = (shifted, offset, center);
+        (self.shifted, self.offset) = (shifted, offset);
         solved
     }
 
@@ -226,8 +226,8 @@ impl<T: Real> ConeNewton<T> {
                             if j == first { sum - friction * compliance * direction[k - 1] } else { sum }
                         };
                         matrix.extend(rows.iter().map(|&j| entry(j)));
-                        let pushed = tangents.clone().map(|i| across(i) * problem.offset[first + i]).sum::<T>();
-                        right.push(-pushed);
+                        let constant = tangents.clone().map(|i| across(i) * problem.offset[first + i]).sum::<T>();
+                        right.push(-constant);
                     }
                     Status::Held | Status::Open => {
                         matrix.extend(rows.iter().map(|&j| problem.delassus(row, j)));
@@ -279,13 +279,16 @@ fn status<T: Real>(
         // A pulling bilateral contact has no friction.
         return Status::Slides { direction: [T::zero(); 2], share: T::zero(), compliance };
     }
-    let mut aim = [T::zero(); 2];
-    for (aim, row) in aim.iter_mut().zip(tangents) {
-        *aim = compliance * multipliers[row] - y[row];
+    let mut augmented = [T::zero(); 2];
+    for (augmented, row) in augmented.iter_mut().zip(tangents) {
+        *augmented = compliance * multipliers[row] - y[row];
     }
-    let (size, radius) = (aim[0].hypot(aim[1]), compliance * T::of(friction) * multipliers[first].max(T::zero()));
+    let (size, radius) =
+        (augmented[0].hypot(augmented[1]), compliance * T::of(friction) * multipliers[first].max(T::zero()));
     match size > radius {
         false => Status::Held,
-        true => Status::Slides { direction: aim.map(|aim| aim / size), share: radius / size, compliance },
+        true => {
+            Status::Slides { direction: augmented.map(|augmented| augmented / size), share: radius / size, compliance }
+        }
     }
 }

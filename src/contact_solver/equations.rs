@@ -21,20 +21,20 @@ pub(super) struct Equations<T> {
     dependent: Block,
 }
 
-/// A block of W: some rows of one version of W. Version 0 matches nothing.
+/// A block of W: some rows of one version of W, if any.
 #[derive(Clone, Debug, Default)]
 struct Block {
-    version: u64,
+    version: Option<u64>,
     rows: Vec<usize>,
 }
 
 impl Block {
     fn is(&self, version: u64, rows: &[usize]) -> bool {
-        self.version > 0 && self.version == version && self.rows == rows
+        self.version == Some(version) && self.rows == rows
     }
 
     fn set(&mut self, version: u64, rows: &[usize]) {
-        self.version = version;
+        self.version = Some(version);
         self.rows.clear();
         self.rows.extend_from_slice(rows);
     }
@@ -43,14 +43,19 @@ impl Block {
 impl<T: Real> Equations<T> {
     /// Memory for up to `rows` rows. For many rows the factor is a fallback and is allocated only when needed.
     pub(super) fn with_capacity(rows: usize) -> Self {
-        let block = || Block { version: 0, rows: Vec::with_capacity(rows) };
+        let block = || Block { version: None, rows: Vec::with_capacity(rows) };
         let factor = DenseCholesky::with_capacity(if rows < MANY { rows } else { FORESEEN });
         Self { factor, factored: block(), dependent: block(), ..Self::default() }
     }
 
-    /// Solves for `x`, which holds b on entry. Returns false, without a
-    /// solution, if the rows depend on one another. `Err(row)` gives a row of the problem whose W is
-    /// not finite or not semidefinite.
+    /// Discards what is kept of earlier problems.
+    pub(super) fn forget(&mut self) {
+        self.factored.version = None;
+        self.dependent.version = None;
+    }
+
+    /// Solves for `x`, which holds b on entry. Returns false, without a solution, if the rows depend on one another.
+    /// `Err(row)` gives a row of the problem whose W is not finite or not semidefinite.
     pub(super) fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,
@@ -63,7 +68,7 @@ impl<T: Real> Equations<T> {
             return Ok(false);
         }
         if !(self.shift == shift && self.factored.is(problem.version, rows)) {
-            self.factored.version = 0;
+            self.factored.version = None;
             self.iterates = plain
                 && rows.len() >= MANY
                 && structure.symmetry() == Symmetry::Symmetric
@@ -79,7 +84,7 @@ impl<T: Real> Equations<T> {
                 return Ok(true);
             }
             self.iterates = false;
-            self.factored.version = 0;
+            self.factored.version = None;
             self.factorize(problem, structure, (rows, shift))?;
             self.factored.set(problem.version, rows);
         }

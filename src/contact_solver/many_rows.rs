@@ -35,7 +35,7 @@ pub(super) struct ManyRows<T> {
     block: Vec<T>,
     /// Vectors of the iteration, one entry per active row: residual, preconditioned residual, H r, b.
     residual: Vec<T>,
-    pushed: Vec<T>,
+    preconditioned: Vec<T>,
     inner: Vec<T>,
     right: Vec<T>,
     /// Direction and its product, one entry per row of the problem.
@@ -110,7 +110,7 @@ impl<T: Real> ManyRows<T> {
         x: &mut [T],
     ) -> Option<usize> {
         let (count, size) = (rows.len(), problem.size());
-        for vector in [&mut self.residual, &mut self.pushed, &mut self.inner] {
+        for vector in [&mut self.residual, &mut self.preconditioned, &mut self.inner] {
             vector.clear();
             vector.resize(count, T::zero());
         }
@@ -165,10 +165,10 @@ impl<T: Real> ManyRows<T> {
                 return Some(iteration);
             }
             self.precondition();
-            let now = dot(&self.residual, &self.pushed);
+            let now = dot(&self.residual, &self.preconditioned);
             let share = if iteration == 0 { T::zero() } else { now / before };
             before = now;
-            for (&row, &z) in rows.iter().zip(&self.pushed) {
+            for (&row, &z) in rows.iter().zip(&self.preconditioned) {
                 self.direction[row] = z + share * self.direction[row];
             }
             self.multiply(problem, structure, rows);
@@ -189,16 +189,16 @@ impl<T: Real> ManyRows<T> {
 
     /// Hᵀ H r.
     fn precondition(&mut self) {
-        let Self { starts, places, values, residual, pushed, inner, .. } = self;
+        let Self { starts, places, values, residual, preconditioned, inner, .. } = self;
         for (range, inner) in starts.windows(2).zip(inner.iter_mut()) {
             let range = range[0]..range[1];
             *inner = places[range.clone()].iter().zip(&values[range]).map(|(&j, &h)| h * residual[j]).sum();
         }
-        pushed.fill(T::zero());
+        preconditioned.fill(T::zero());
         for (range, &inner) in starts.windows(2).zip(inner.iter()) {
             let range = range[0]..range[1];
             for (&j, &h) in places[range.clone()].iter().zip(&values[range]) {
-                pushed[j] += h * inner;
+                preconditioned[j] += h * inner;
             }
         }
     }

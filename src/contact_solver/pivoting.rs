@@ -215,7 +215,8 @@ impl<T: Real> Basis<T> {
         hardest.map_or(p, |k| self.rows[k])
     }
 
-    /// The largest change of λ_p, in the direction of the sign, before an active multiplier is zero, and the position of that row.
+    /// The largest change of λ_p, in the direction of the sign, before an active multiplier is zero, and the position
+    /// of that row.
     fn blocking(
         &self,
         problem: &ContactProblem<'_, T>,

@@ -159,14 +159,14 @@ fn cone_residuals<T: Real>(
     }
     let tangential = compliance[1..].iter().fold(T::zero(), |most, &w| most.max(w));
     let mut miss = [T::zero(); 2];
-    let mut aim = [T::zero(); 2];
-    for (k, aim) in aim.iter_mut().enumerate().take(y.len() - 1) {
-        *aim = tangential * multipliers[k + 1] - y[k + 1];
+    let mut augmented = [T::zero(); 2];
+    for (k, augmented) in augmented.iter_mut().enumerate().take(y.len() - 1) {
+        *augmented = tangential * multipliers[k + 1] - y[k + 1];
     }
-    let (size, radius) = (norm(&aim), tangential * friction * multipliers[0].max(T::zero()));
+    let (size, radius) = (norm(&augmented), tangential * friction * multipliers[0].max(T::zero()));
     let share = if size > radius { radius / size } else { T::one() };
     for (k, miss) in miss.iter_mut().enumerate().take(y.len() - 1) {
-        *miss = tangential * multipliers[k + 1] - share * aim[k];
+        *miss = tangential * multipliers[k + 1] - share * augmented[k];
     }
     let normal = if is_bilateral { y[0] } else { y[0].min(compliance[0] * multipliers[0]) };
     [normal.abs(), norm(&miss)]
