@@ -4,7 +4,7 @@ use super::structure::{Structure, Symmetry};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, sweeps};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::{conditioned_share, half_of_digits, rounding, smallest_gap};
+use crate::rounding::{conditioned_share, half_digits, rounding, smallest_gap};
 use std::ops::Range;
 
 /// Tolerance and iteration limit of a solver.
@@ -147,7 +147,7 @@ impl<'a, T: Real> Acceptance<'a, T> {
     /// Whether the residual of every row is a negligible contradiction: at most √ε of the motion that the other rows
     /// may cause in it.
     pub(super) fn is_negligible(&self, multipliers: &[T]) -> bool {
-        let share = half_of_digits::<T>() / conditioned_share();
+        let share = half_digits::<T>() / conditioned_share();
         self.problem.blocks().all(|(rows, set)| {
             let [miss, _] = self.problem.block_misses(rows.clone(), set, multipliers);
             self.bears(rows.start, miss / share)

@@ -7,7 +7,7 @@ use super::equations::Equations;
 use super::structure::Structure;
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
-use crate::rounding::half_of_digits;
+use crate::rounding::half_digits;
 
 /// Primal–dual active set (semismooth Newton) on the Delassus operator, safeguarded by Murty's least-index rule.
 ///
@@ -156,7 +156,7 @@ impl<T: Real> ActiveSet<T> {
         let largest = (0..problem.size()).fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
         // Rounding of q, over the share, is how evenly a force is shared. The least share resolves rows that are nearly
         // dependent, and is large enough for a stable factorization.
-        let least = half_of_digits::<T>();
+        let least = half_digits::<T>();
         let (mut share, mut before) = (least.sqrt(), T::infinity());
         for _ in 0..PROXIMAL_STEPS {
             let (count, is_solved) = self.exchange(problem, share * largest, multipliers)?;

@@ -9,7 +9,7 @@ use super::ContactProblem;
 use super::structure::Structure;
 use crate::dense::dot;
 use crate::real::Real;
-use crate::rounding::{half_of_digits, rounding};
+use crate::rounding::{half_digits, rounding};
 
 /// Entries in a row of the approximate inverse, at most.
 const WIDTH: usize = 20;
@@ -54,7 +54,7 @@ impl<T: Real> ManyRows<T> {
         scale.clear();
         starts.push(0);
         // Lower bound of a pivot, in a block scaled to a unit diagonal.
-        let least = half_of_digits();
+        let least = half_digits();
         for (k, &row) in rows.iter().enumerate() {
             let own = problem.row(row);
             if own[row] <= T::zero() || !own[row].is_finite() {

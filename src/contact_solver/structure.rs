@@ -82,7 +82,7 @@ impl<T: Real> ContactProblem<'_, T> {
         if let Some((rows, _)) = self.blocks().find(|(_, set)| set.friction().is_some()) {
             return Err(ContactFailure::Friction { row: rows.start });
         }
-        match self.asymmetry(rounding::half_of_digits()) {
+        match self.asymmetry(rounding::half_digits()) {
             Some((row, other)) => Err(ContactFailure::Unsymmetric { row, other }),
             None => Ok(()),
         }
