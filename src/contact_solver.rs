@@ -3,17 +3,16 @@
 mod acceptance;
 mod active_set;
 mod applied;
-mod blocks;
 mod cone;
 mod cone_newton;
 mod equations;
-mod extents;
 mod failure;
 mod gauss_seidel;
 mod many_rows;
 mod pivoting;
 mod problem;
 mod projected_gradient;
+mod structure;
 mod sweeps;
 
 pub use crate::contact_failure::ContactFailure;

@@ -7,6 +7,7 @@
 
 use crate::memory::Scratch;
 use crate::real::{Kernels, Real};
+use crate::rounding::{rounding, share_of_rounding};
 
 /// Lower factor L of a symmetric positive semidefinite matrix, or L U of a general one, with its memory.
 #[derive(Clone, Debug, Default)]
@@ -56,19 +57,20 @@ impl<T: Real> DenseCholesky<T> {
         }
     }
 
-    /// Memory for [`factorize_general`](Self::factorize_general) with this many rows.
-    pub(crate) fn reserve_general(&mut self, size: usize) {
-        let Self { l, first, diagonal, independent, .. } = self;
-        l.reserve((size * size).saturating_sub(l.len()));
-        diagonal.reserve(size.saturating_sub(diagonal.len()));
-        for list in [first, independent] {
-            list.reserve(size.saturating_sub(list.len()));
+    /// Memory for [`factorize_general`](Self::factorize_general) only.
+    pub(crate) fn with_general_capacity(size: usize) -> Self {
+        Self {
+            l: Vec::with_capacity(size * size),
+            first: Vec::with_capacity(size),
+            diagonal: Vec::with_capacity(size),
+            independent: Vec::with_capacity(size),
+            ..Self::default()
         }
     }
 
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
-    /// A row is dependent if its pivot is less than `size · 16 eps` of its diagonal entry, or at most the rounding of
+    /// A row is dependent if its pivot is less than `size · 64 ε` of its diagonal entry, or at most the rounding of
     /// the combination of rows that the pivot measures. `Err(row)` if the matrix is not finite or not semidefinite
     /// there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
@@ -95,8 +97,8 @@ impl<T: Real> DenseCholesky<T> {
                 return Err(i);
             }
         }
-        let dependent = T::of(16.0 * size as f64) * T::epsilon();
-        let suspect = T::epsilon().powf(T::of(2.0 / 3.0)).max(dependent);
+        let dependent = rounding(T::of(size as f64));
+        let suspect = share_of_rounding::<T>().max(dependent);
         independent.clear();
         if size >= BLOCKED && profile > size * size / 4 {
             *kind = Kind::Blocked;
@@ -135,7 +137,7 @@ impl<T: Real> DenseCholesky<T> {
                 && (pivot > suspect * diagonal[i] || {
                     let length =
                         combination(done, &row[..i], size, independent, diagonal, reduced) + diagonal[i].sqrt();
-                    pivot > T::of(32.0) * T::epsilon() * length * length
+                    pivot > rounding(length * length)
                 });
             if sound {
                 row[i] = pivot.sqrt();
@@ -144,9 +146,7 @@ impl<T: Real> DenseCholesky<T> {
                 row[i] = T::zero();
             }
         }
-        if independent.len() < size {
-            self.factorize_normal();
-        }
+        self.normal.clear();
         Ok(())
     }
 
@@ -170,7 +170,7 @@ impl<T: Real> DenseCholesky<T> {
                 return Err(i);
             }
         }
-        let dependent = T::of(16.0 * size as f64) * T::epsilon();
+        let dependent = rounding(T::of(size as f64));
         // `diagonal` is permuted with the rows; the scale of a column is computed before that.
         for k in 0..size {
             let measure = entry(k, k).sqrt();
@@ -279,6 +279,9 @@ impl<T: Real> DenseCholesky<T> {
 
     /// A⁺ b = L (LᵀL)⁻² Lᵀ b.
     fn solve_least_norm(&mut self, x: &mut [T]) {
+        if self.normal.is_empty() {
+            self.factorize_normal();
+        }
         let Self { size, l, independent, normal, reduced, .. } = self;
         let (n, rank) = (*size, independent.len());
         reduced.clear();

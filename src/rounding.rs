@@ -12,7 +12,8 @@ pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
     T::of(64.0) * T::epsilon() * magnitude
 }
 
-/// The share ε^⅔ of a velocity below which its last bits decide whether bodies that touch without force open or close.
+/// The share ε^⅔ of a velocity below which its last bits decide whether bodies that touch without force open or close;
+/// of the diagonal, below which a pivot may be rounding multiplied by the condition of the earlier ones.
 pub(crate) fn share_of_rounding<T: Real>() -> T {
     T::of(T::epsilon().value().powf(2.0 / 3.0))
 }
@@ -20,6 +21,24 @@ pub(crate) fn share_of_rounding<T: Real>() -> T {
 /// Half of the digits: √ε.
 pub(crate) fn half_digits<T: Real>() -> T {
     T::epsilon().sqrt()
+}
+
+// Contact solvers.
+
+/// The share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ: the rounding of 64 terms.
+pub(crate) fn asymmetry<T: Real>() -> T {
+    rounding(T::of(64.0))
+}
+
+/// The share ε^⅖ of its motion without contact by which a gap may be violated by rounding, however large the forces of
+/// badly conditioned rows are.
+pub(crate) fn conditioned_share<T: Real>() -> T {
+    T::of(T::epsilon().value().powf(0.4))
+}
+
+/// Gaps below this have lost their digits, as of motions that have died out: they need no solve. A length.
+pub(crate) fn smallest_gap<T: Real>() -> T {
+    T::min_positive_value() / T::epsilon()
 }
 
 // Contact.

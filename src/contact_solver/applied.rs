@@ -1,10 +1,12 @@
 //! Contact problems with a matrix-free W: if the factor of a body changes with every iteration, computing the
 //! response to each of hundreds of rows would cost more than the factorization.
 
+use super::acceptance::Settings;
 use super::{AdmissibleSet, ContactFailure};
 use crate::dense::dot;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding as sum_rounding;
 
 /// Writes W x to its second argument, with x its first.
 pub(crate) type Product<'a, T> = &'a mut dyn FnMut(&[T], &mut [T]);
@@ -105,31 +107,17 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
 /// Limit of row exchanges.
 const EXCHANGES: usize = 40;
 
-/// Exchanges allowed without progress.
-const TRIES: usize = 4;
-
 /// Products allowed for the equations of one active set.
 const PRODUCTS: usize = 200;
 
 /// Restarts of the equation solver to reduce rounding errors.
 const REFINEMENTS: usize = 3;
 
-/// How well equations are met; the best first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Met {
-    /// To the rounding of their own terms.
-    Exactly,
-    /// To a small fraction of the largest q.
-    Nearly,
-    Not,
-}
-
 /// Memory of the primal–dual active set with a matrix-free W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AppliedSet<T> {
     active: Vec<bool>,
     y: Vec<T>,
-    noise: Vec<T>,
     rounding: Vec<T>,
     residual: Vec<T>,
     direction: Vec<T>,
@@ -144,8 +132,8 @@ impl<T: Real> AppliedSet<T> {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let size = problem.size();
-        let Self { y, noise, rounding, residual, direction, product, .. } = self;
-        for vector in [y, noise, rounding, residual, direction, product] {
+        let Self { y, rounding, residual, direction, product, .. } = self;
+        for vector in [y, rounding, residual, direction, product] {
             vector.clear();
             vector.resize(size, T::zero());
         }
@@ -154,89 +142,73 @@ impl<T: Real> AppliedSet<T> {
         self.active.extend(guess.map(|(&lambda, &set)| set == AdmissibleSet::Free || lambda > T::zero()));
         // The magnitude of an old guess must not persist.
         multipliers.fill(T::zero());
-        let (mut fewest, mut tries) = (usize::MAX, TRIES);
+        let accepted = Settings::<T>::default().tolerance() * T::largest(problem.offset);
         for exchange in 1..=EXCHANGES {
-            let failure = |row| ContactFailure::NotConverged { iterations: exchange, row, residual: T::nan() };
-            if !self.solve_active(problem, multipliers) {
-                return Err(failure(0));
+            if !self.solve_active(problem, accepted, multipliers) {
+                return Err(ContactFailure::NotConverged { iterations: exchange, row: 0, residual: T::nan() });
             }
-            let Self { active, y, noise, .. } = self;
-            let mut violations = 0;
+            let Self { active, y, rounding, .. } = self;
+            let mut is_solved = true;
             for (i, active) in active.iter_mut().enumerate() {
-                let violated = match (problem.sets[i], *active) {
-                    (AdmissibleSet::Free, _) => false,
-                    (_, true) => problem.scale[i] * multipliers[i] < -noise[i],
-                    (_, false) => y[i] < -noise[i],
-                };
-                violations += usize::from(violated);
-                *active ^= violated;
+                let noise = problem.tolerance[i] + rounding[i] + accepted;
+                let miss = if *active { -problem.scale[i] * multipliers[i] } else { -y[i] };
+                if problem.sets[i] != AdmissibleSet::Free && miss > noise {
+                    *active = !*active;
+                    is_solved = false;
+                }
             }
-            if violations == 0 {
+            if is_solved {
                 for (lambda, &set) in multipliers.iter_mut().zip(problem.sets) {
                     *lambda = set.nearest(*lambda);
                 }
                 return Ok(exchange);
-            }
-            if violations < fewest {
-                (fewest, tries) = (violations, TRIES);
-            } else {
-                tries -= 1;
-            }
-            if tries == 0 {
-                return Err(failure(0));
             }
         }
         Err(ContactFailure::NotConverged { iterations: EXCHANGES, row: 0, residual: T::nan() })
     }
 
     /// Solves the equations of the active rows by conjugate gradients, starting from the present multipliers, and
-    /// leaves y and its noise. Returns whether every equation is met within that noise.
-    fn solve_active(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &mut [T]) -> bool {
+    /// leaves y and its rounding. Returns whether every equation is met to rounding, or to the `accepted` residual.
+    fn solve_active(&mut self, problem: &mut AppliedProblem<'_, T>, accepted: T, multipliers: &mut [T]) -> bool {
         for (lambda, &active) in multipliers.iter_mut().zip(&self.active) {
             if !active {
                 *lambda = T::zero();
             }
         }
         for _ in 0..REFINEMENTS {
-            if self.observe(problem, multipliers) == Met::Exactly {
+            self.evaluate(problem, multipliers);
+            if self.is_met(T::zero()) {
                 return true;
             }
             if !self.iterate(problem, multipliers) {
                 return false;
             }
         }
-        self.observe(problem, multipliers) != Met::Not
+        self.evaluate(problem, multipliers);
+        self.is_met(accepted)
     }
 
-    /// Evaluates y, the rounding of its terms, and the noise below which it counts as zero; returns how well the
-    /// equations are met.
-    fn observe(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &[T]) -> Met {
-        let Self { active, y, noise, rounding, direction, product, .. } = self;
+    /// Whether every active equation is met to rounding, or to this residual.
+    fn is_met(&self, accepted: T) -> bool {
+        let rows = self.active.iter().zip(&self.y).zip(&self.rounding);
+        rows.into_iter().all(|((active, y), &rounding)| y.is_finite() && (!active || y.abs() <= rounding + accepted))
+    }
+
+    /// Evaluates y and the rounding of its terms.
+    fn evaluate(&mut self, problem: &mut AppliedProblem<'_, T>, multipliers: &[T]) {
+        let Self { y, rounding, direction, product, .. } = self;
         problem.apply(multipliers, y);
         for (size, lambda) in direction.iter_mut().zip(multipliers) {
             *size = lambda.abs();
         }
         problem.apply(direction, product);
-        let largest = problem.offset.iter().fold(T::zero(), |largest, q| largest.max(q.abs()));
-        let share = T::of(1e-12).max(T::of(8.0) * T::epsilon()) * largest;
-        let mut met = Met::Exactly;
         for (i, y) in y.iter_mut().enumerate() {
             // Entries of W may cancel in the product with magnitudes: the row's own terms are a lower bound.
             let terms = product[i].abs().max(y.abs()).max(problem.scale[i] * multipliers[i].abs());
             *y += problem.offset[i];
             // Convergence must not depend on tolerances, because these depend on where the rows were evaluated.
-            rounding[i] = T::of(32.0) * T::epsilon() * (problem.offset[i].abs() + terms);
-            noise[i] = problem.tolerance[i] + rounding[i] + share;
-            let row = match y.abs() {
-                _ if !y.is_finite() => Met::Not,
-                _ if !active[i] => Met::Exactly,
-                size if size <= rounding[i] => Met::Exactly,
-                size if size <= rounding[i] + share => Met::Nearly,
-                _ => Met::Not,
-            };
-            met = met.max(row);
+            rounding[i] = sum_rounding(problem.offset[i].abs() + terms);
         }
-        met
     }
 
     /// Conjugate gradients on the active rows, scaled by the diagonal, starting from the y of the multipliers.
@@ -248,7 +220,7 @@ impl<T: Real> AppliedSet<T> {
         direction.fill(T::zero());
         let weighted = |x: &[T], scale: &[T]| x.iter().zip(scale).map(|(&x, &s)| x * x / s).sum::<T>();
         // Goal: each equation within a fraction of its own rounding.
-        let goal = weighted(rounding, problem.scale) * T::of(1e-2) / T::of(residual.len() as f64);
+        let goal = weighted(rounding, problem.scale) / T::of(residual.len() as f64);
         let mut before = T::zero();
         for step in 0..PRODUCTS {
             let now = weighted(residual, problem.scale);

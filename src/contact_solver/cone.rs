@@ -1,6 +1,7 @@
 //! Exact solution of one contact with friction: a block of a normal row and one or two tangential rows.
 
 use crate::real::Real;
+use crate::rounding::rounding;
 
 /// A block W r + b of a contact, with its friction coefficient; blocks of two rows are padded to three.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +91,7 @@ impl<T: Real> Cone<T> {
             return false;
         }
         let ([[xx, xy], [yx, yy]], c) = self.without_normal();
-        let tiny = T::of(64.0) * T::epsilon();
+        let tiny = rounding(T::one());
         let (trace, scale) = (xx + yy, w[1][1] + w[2][2]);
         if xx * yy - xy * yx > tiny * trace * scale {
             return false;
@@ -114,7 +115,7 @@ impl<T: Real> Cone<T> {
 
 /// Solves S f = −c, with the least f if S is singular; `None` if no f solves it within rounding.
 fn hold<T: Real>(s: [[T; 2]; 2], c: [T; 2], noise: T) -> Option<[T; 2]> {
-    let tiny = T::of(64.0) * T::epsilon();
+    let tiny = rounding(T::one());
     let (trace, determinant) = (s[0][0] + s[1][1], s[0][0] * s[1][1] - s[0][1] * s[1][0]);
     if determinant > tiny * trace * trace {
         return Some(solve_two(s, T::zero(), c)).filter(|f| f.iter().all(|f| f.is_finite()));
@@ -179,7 +180,7 @@ fn slip_direction<T: Real>(
         let moved = (next - gamma).abs();
         gamma = next;
         f = solve_two(schur, gamma, c);
-        if moved <= T::of(4.0) * T::epsilon() * (gamma + size) {
+        if moved <= rounding(gamma + size) {
             break;
         }
     }

@@ -1,14 +1,16 @@
 //! Contact problems with friction by a semismooth Newton method on the block states open, stick and slip.
 
-use super::blocks::{BlockAcceptance, failure};
-use super::sweeps::Sweeps;
+use super::acceptance::{Acceptance, Settings};
+use super::structure::Symmetry;
+use super::sweeps::{Schedule, Sweeps};
 use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
+use crate::rounding::rounding;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), started from sweeps
-/// over the blocks, and restarted from more sweeps if it does not end. On redundant rows neither may end; the problem
-/// is then solved by proximal steps, each with a positive definite W.
+/// over the blocks. On redundant rows it may not end; the problem is then solved by proximal steps, each with a
+/// positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
     sweeps: Sweeps<T>,
@@ -21,41 +23,23 @@ pub(super) struct ConeNewton<T> {
     y: Vec<T>,
     tried: Vec<T>,
     found: Vec<T>,
-    /// A proximal problem: its W, offset and center.
+    /// A proximal problem: its W and offset.
     shifted: Vec<T>,
     offset: Vec<T>,
-    center: Vec<T>,
 }
 
-/// Sweeps before Newton's method: before the first attempt, and before each later one.
+/// Sweeps before Newton's method, at least, and in a proximal step whose Newton iterations do not end.
 const FIRST_SWEEPS: usize = 3;
 const MORE_SWEEPS: usize = 50;
 
-/// Newton iterations per attempt, and number of attempts.
+/// Newton iterations.
 const ITERATIONS: usize = 20;
-const ROUNDS: usize = 4;
 
-/// Proximal steps: the initial share of the diagonal added to W, its shrink factor, and its minimum. Nearly redundant
-/// rows are resolved only with a share below their difference relative to the diagonal.
+/// Proximal steps: the initial share of the diagonal added to W, and its shrink factor. Nearly redundant rows are
+/// resolved only with a share below their difference relative to the diagonal.
 const PROXIMAL_STEPS: usize = 300;
 const FIRST_SHARE: f64 = 1.0;
 const SHRINK: f64 = 0.3;
-const LEAST_SHARE: f64 = 1e-13;
-
-/// Final sweeps without Newton's method.
-const LAST_SWEEPS: usize = 20_000;
-
-/// Iterations in which blocks that pull by rounding are open.
-const LETS_GO: usize = 3;
-
-/// Treatment of a unilateral block that pulls in an iteration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Pulled {
-    /// Its conditions decide.
-    AsItIs,
-    /// It is open.
-    LetsGo,
-}
 
 /// State of a block in an iteration.
 #[derive(Clone, Copy, Debug)]
@@ -70,80 +54,76 @@ enum Status<T> {
 }
 
 impl<T: Real> ConeNewton<T> {
-    /// Solves; the guess is not used.
+    /// Solves from zero multipliers.
     pub(super) fn solve(
         &mut self,
-        problem: &ContactProblem<'_, T>,
-        tolerance: T,
+        acceptance: &Acceptance<'_, T>,
+        symmetry: Symmetry,
         multipliers: &mut [T],
     ) -> Result<usize, ContactFailure<T>> {
-        let acceptance = BlockAcceptance::begin(problem, tolerance, multipliers)?;
-        self.make_room(problem.size());
-        self.sweeps.reset();
-        let mut spent = 0;
-        for round in 0..ROUNDS {
-            // A sweep costs about 3/n of an iteration: first up to half an iteration's worth of sweeps, as long as
-            // they converge.
-            let sweeps = if round == 0 { FIRST_SWEEPS.max(problem.size() / 6) } else { MORE_SWEEPS };
-            if acceptance.sweep(problem, (&mut self.sweeps, T::one()), sweeps, true, (&mut spent, multipliers)) {
-                return Ok(spent);
-            }
-            if round == 0 {
-                // A problem solved by sweeps is finite.
-                problem.check_finite(false)?;
-            }
-            if self.newton(problem, &acceptance, &mut spent, multipliers) {
-                return Ok(spent);
-            }
+        let size = acceptance.problem().size();
+        if self.y.capacity() < size {
+            *self = Self::with_capacity(size);
         }
-        if self.proximal(problem, (&acceptance, tolerance), &mut spent, multipliers)
-            || acceptance.sweep(problem, (&mut self.sweeps, T::one()), LAST_SWEEPS, false, (&mut spent, multipliers))
+        let mut spent = 0;
+        // A sweep costs about 3/n of a Newton iteration: first up to half an iteration's worth of sweeps, as long as
+        // they converge.
+        let sweeps = FIRST_SWEEPS.max(size / 6);
+        let schedule = Schedule { omega: T::one(), sweeps, impatient: true };
+        if self.sweeps.solve(acceptance, symmetry, schedule, &mut spent, multipliers)
+            || self.newton(acceptance, &mut spent, multipliers)
+            || self.proximal(acceptance, symmetry, &mut spent, multipliers)
         {
             return Ok(spent);
         }
-        Err(failure(problem, spent, multipliers))
+        Err(acceptance.failure(spent, multipliers))
     }
 
-    /// Grows the memory to at least this many rows.
-    fn make_room(&mut self, size: usize) {
-        let Self { factor, statuses, rows, matrix, right, y, tried, found, .. } = self;
-        if matrix.capacity() < size * size {
-            factor.reserve_general(size);
-            matrix.reserve(size * size - matrix.len());
-        }
-        statuses.reserve(size.saturating_sub(statuses.len()));
-        rows.reserve(size.saturating_sub(rows.len()));
-        for values in [right, y, tried, found] {
-            values.reserve(size.saturating_sub(values.len()));
+    fn with_capacity(size: usize) -> Self {
+        let reals = || Vec::with_capacity(size);
+        Self {
+            sweeps: Sweeps::with_capacity(size),
+            factor: DenseCholesky::with_general_capacity(size),
+            statuses: Vec::with_capacity(size),
+            rows: Vec::with_capacity(size),
+            matrix: Vec::with_capacity(size * size),
+            right: reals(),
+            y: reals(),
+            tried: reals(),
+            found: reals(),
+            ..Self::default()
         }
     }
 
     /// Newton iterations; returns whether they have converged without pulling contacts. If not, the multipliers are
     /// unchanged.
-    fn newton(
-        &mut self,
-        problem: &ContactProblem<'_, T>,
-        acceptance: &BlockAcceptance<T>,
-        spent: &mut usize,
-        multipliers: &mut [T],
-    ) -> bool {
+    fn newton(&mut self, acceptance: &Acceptance<'_, T>, spent: &mut usize, multipliers: &mut [T]) -> bool {
+        let problem = acceptance.problem();
         let [mut tried, mut found] = [&mut self.tried, &mut self.found].map(std::mem::take);
         tried.clear();
         tried.extend_from_slice(multipliers);
         let mut solved = false;
         for _ in 0..ITERATIONS {
             *spent += 1;
-            let sound = self.iterate(problem, Pulled::AsItIs, &mut tried);
-            solved = sound && acceptance.accepts(problem, &tried);
+            let sound = self.iterate(problem, &mut tried);
+            solved = sound && acceptance.accepts(&tried);
             if solved || !sound {
                 break;
             }
         }
         if solved {
+            // A closed contact without force may pull by rounding: it is opened if the result is still accepted.
             found.clear();
             found.extend_from_slice(&tried);
-            self.let_go(problem, acceptance, &mut tried, &mut found);
-            solved = !pulls_beyond_rounding(problem, &found);
+            for (rows, set) in problem.blocks() {
+                if !set.is_bilateral() && found[rows.start] < T::zero() {
+                    found[rows].fill(T::zero());
+                }
+            }
+            if !acceptance.accepts(&found) {
+                std::mem::swap(&mut tried, &mut found);
+                solved = !pulls_beyond_rounding(problem, &found);
+            }
         }
         if solved {
             multipliers.copy_from_slice(&found);
@@ -152,68 +132,19 @@ impl<T: Real> ConeNewton<T> {
         solved
     }
 
-    /// A closed contact without force may pull by rounding: it is opened if the result is still accepted. First all
-    /// such contacts are opened with the others unchanged, then with the others solved again; otherwise one by one,
-    /// as far as the result is accepted.
-    fn let_go(
-        &mut self,
-        problem: &ContactProblem<'_, T>,
-        acceptance: &BlockAcceptance<T>,
-        tried: &mut [T],
-        multipliers: &mut [T],
-    ) {
-        let pulls = |multipliers: &[T]| problem.blocks().any(|(rows, set)| is_pulled(rows.start, set, multipliers));
-        if !pulls(multipliers) {
-            return;
-        }
-        for (rows, set) in problem.blocks() {
-            if is_pulled(rows.start, set, multipliers) {
-                tried[rows].fill(T::zero());
-            }
-        }
-        if acceptance.accepts(problem, tried) {
-            multipliers.copy_from_slice(tried);
-            return;
-        }
-        tried.copy_from_slice(multipliers);
-        for _ in 0..LETS_GO {
-            if !self.iterate(problem, Pulled::LetsGo, tried) {
-                break;
-            }
-            if !pulls(tried) {
-                if acceptance.accepts(problem, tried) {
-                    multipliers.copy_from_slice(tried);
-                    return;
-                }
-                break;
-            }
-        }
-        for (rows, set) in problem.blocks() {
-            if is_pulled(rows.start, set, multipliers) {
-                let kept: [T; 3] = std::array::from_fn(|k| multipliers[(rows.start + k).min(rows.end - 1)]);
-                multipliers[rows.clone()].fill(T::zero());
-                if !acceptance.accepts(problem, multipliers) {
-                    multipliers[rows.clone()].copy_from_slice(&kept[..rows.len()]);
-                }
-            }
-        }
-    }
-
     /// Proximal steps: λ' solves the problem with W + D and q − D λ, with D a shrinking share of the diagonal of W.
     fn proximal(
         &mut self,
-        problem: &ContactProblem<'_, T>,
-        (acceptance, tolerance): (&BlockAcceptance<T>, T),
+        acceptance: &Acceptance<'_, T>,
+        symmetry: Symmetry,
         spent: &mut usize,
         multipliers: &mut [T],
     ) -> bool {
+        let problem = acceptance.problem();
         let size = problem.size();
-        let [mut shifted, mut offset, mut center] =
-            [&mut self.shifted, &mut self.offset, &mut self.center].map(std::mem::take);
+        let [mut shifted, mut offset] = [&mut self.shifted, &mut self.offset].map(std::mem::take);
         let (mut share, mut solved) = (T::of(FIRST_SHARE), false);
         for _ in 0..PROXIMAL_STEPS {
-            center.clear();
-            center.extend_from_slice(multipliers);
             shifted.clear();
             shifted.extend_from_slice(problem.delassus);
             offset.clear();
@@ -223,40 +154,38 @@ impl<T: Real> ConeNewton<T> {
                 let own = rows.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
                 for row in rows {
                     shifted[row * size + row] += share * own;
-                    offset[row] -= share * own * center[row];
+                    offset[row] -= share * own * multipliers[row];
                 }
             }
             let step = ContactProblem::of(&shifted, &offset, problem.sets, problem.tolerance, 0);
-            let own = BlockAcceptance::of(&step, tolerance);
-            let ended = self.newton(&step, &own, spent, multipliers)
-                || own.sweep(&step, (&mut self.sweeps, T::one()), MORE_SWEEPS, false, (&mut *spent, multipliers))
-                || self.newton(&step, &own, spent, multipliers);
-            solved = acceptance.accepts(problem, multipliers);
+            let own = Settings::default().rule(&step);
+            let schedule = Schedule { omega: T::one(), sweeps: MORE_SWEEPS, impatient: false };
+            let ended = self.newton(&own, spent, multipliers)
+                || self.sweeps.solve(&own, symmetry, schedule, spent, multipliers)
+                || self.newton(&own, spent, multipliers);
+            solved = acceptance.accepts(multipliers);
             if solved {
                 break;
             }
             // A step that cannot be solved was too large.
             share = match ended {
-                true => (share * T::of(SHRINK)).max(T::of(LEAST_SHARE)),
+                true => (share * T::of(SHRINK)).max(rounding(T::one())),
                 false => share / T::of(SHRINK * SHRINK),
             };
         }
-        (self.shifted, self.offset, self.center) = (shifted, offset, center);
+        (self.shifted, self.offset) = (shifted, offset);
         solved
     }
 
     /// One iteration; returns whether its equations were solvable.
-    fn iterate(&mut self, problem: &ContactProblem<'_, T>, pulled: Pulled, multipliers: &mut [T]) -> bool {
+    fn iterate(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> bool {
         let Self { factor, statuses, rows, matrix, right, y, .. } = self;
         y.clear();
         y.extend((0..problem.size()).map(|row| problem.gap(row, multipliers)));
         rows.clear();
         statuses.clear();
         for (block, set) in problem.blocks() {
-            let status = match pulled == Pulled::LetsGo && is_pulled(block.start, set, multipliers) {
-                true => Status::Open,
-                false => status(problem, block.start, set, multipliers, y),
-            };
+            let status = status(problem, block.start, set, multipliers, y);
             statuses.push(status);
             if !matches!(status, Status::Open) {
                 rows.extend(block);
@@ -297,8 +226,8 @@ impl<T: Real> ConeNewton<T> {
                             if j == first { sum - friction * compliance * direction[k - 1] } else { sum }
                         };
                         matrix.extend(rows.iter().map(|&j| entry(j)));
-                        let pushed = tangents.clone().map(|i| across(i) * problem.offset[first + i]).sum::<T>();
-                        right.push(-pushed);
+                        let constant = tangents.clone().map(|i| across(i) * problem.offset[first + i]).sum::<T>();
+                        right.push(-constant);
                     }
                     Status::Held | Status::Open => {
                         matrix.extend(rows.iter().map(|&j| problem.delassus(row, j)));
@@ -320,18 +249,11 @@ impl<T: Real> ConeNewton<T> {
     }
 }
 
-/// Whether a unilateral block has a pulling force.
-fn is_pulled<T: Real>(first: usize, set: AdmissibleSet, multipliers: &[T]) -> bool {
-    !set.is_bilateral() && multipliers[first] < T::zero()
-}
-
 /// Whether a contact pulls by more than the rounding of the largest multiplier, with rows scaled by √W_ii.
 fn pulls_beyond_rounding<T: Real>(problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
-    /// Roundings by which a contact may pull.
-    const ROUNDINGS: f64 = 16.0;
     let measured = |row: usize| multipliers[row] * problem.delassus(row, row).max(T::zero()).sqrt();
     let largest = (0..problem.size()).map(|row| measured(row).abs()).fold(T::zero(), T::max);
-    let least = T::of(-ROUNDINGS) * T::epsilon() * largest;
+    let least = -rounding(largest);
     problem.blocks().any(|(rows, set)| !set.is_bilateral() && measured(rows.start) < least)
 }
 
@@ -357,13 +279,16 @@ fn status<T: Real>(
         // A pulling bilateral contact has no friction.
         return Status::Slides { direction: [T::zero(); 2], share: T::zero(), compliance };
     }
-    let mut aim = [T::zero(); 2];
-    for (aim, row) in aim.iter_mut().zip(tangents) {
-        *aim = compliance * multipliers[row] - y[row];
+    let mut augmented = [T::zero(); 2];
+    for (augmented, row) in augmented.iter_mut().zip(tangents) {
+        *augmented = compliance * multipliers[row] - y[row];
     }
-    let (size, radius) = (aim[0].hypot(aim[1]), compliance * T::of(friction) * multipliers[first].max(T::zero()));
+    let (size, radius) =
+        (augmented[0].hypot(augmented[1]), compliance * T::of(friction) * multipliers[first].max(T::zero()));
     match size > radius {
         false => Status::Held,
-        true => Status::Slides { direction: aim.map(|aim| aim / size), share: radius / size, compliance },
+        true => {
+            Status::Slides { direction: augmented.map(|augmented| augmented / size), share: radius / size, compliance }
+        }
     }
 }

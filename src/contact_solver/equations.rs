@@ -1,110 +1,112 @@
-//! The equations of the active rows, W_AA λ_A = −q_A: by a factor, or for many rows by iteration. The factorization
-//! or preconditioner is reused while W and the rows stay the same.
+//! The equations of the active rows, (W + d I)_AA λ_A = b, with a shift d from zero: by a factor, or for many
+//! independent rows by iteration. The factor or preconditioner is kept while W, the rows and the shift stay the same.
 
-use super::extents::Extents;
 use super::many_rows::ManyRows;
+use super::structure::{Structure, Symmetry};
 use super::{ContactProblem, FORESEEN, MANY};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
-/// A factor of W on some rows, or the iterative solver that replaces it.
+/// A factor of W + d I on some rows, or the iterative solver that replaces it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Equations<T> {
     factor: DenseCholesky<T>,
     many: ManyRows<T>,
-    method: Method,
-    /// The version of W, and the rows, of the stored factorization; version 0 if there is none.
-    version: u64,
+    /// Whether the iterative solver is used.
+    iterates: bool,
+    /// The rows of the stored factor, and its shift of the diagonal.
+    factored: Block,
+    shift: T,
+    /// The rows last found to depend on one another.
+    dependent: Block,
+}
+
+/// A block of W: some rows of one version of W, if any.
+#[derive(Clone, Debug, Default)]
+struct Block {
+    version: Option<u64>,
     rows: Vec<usize>,
 }
 
-/// How the equations are solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Method {
-    #[default]
-    Factor,
-    Iteration,
-}
+impl Block {
+    fn is(&self, version: u64, rows: &[usize]) -> bool {
+        self.version == Some(version) && self.rows == rows
+    }
 
-/// Whether W is symmetric to rounding.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Symmetry {
-    #[default]
-    Symmetric,
-    General,
-}
-
-/// Result of solving the equations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Solved {
-    /// The solution is unique.
-    Once,
-    /// The rows are dependent: the least-norm solution was taken.
-    LeastNorm,
-    /// The rows are dependent and W is not symmetric: no solution was computed.
-    Not,
+    fn set(&mut self, version: u64, rows: &[usize]) {
+        self.version = Some(version);
+        self.rows.clear();
+        self.rows.extend_from_slice(rows);
+    }
 }
 
 impl<T: Real> Equations<T> {
     /// Memory for up to `rows` rows. For many rows the factor is a fallback and is allocated only when needed.
     pub(super) fn with_capacity(rows: usize) -> Self {
-        let dense = if rows < MANY { rows } else { FORESEEN };
-        let factor = DenseCholesky::with_capacity(dense);
-        Self { factor, many: ManyRows::default(), method: Method::Factor, version: 0, rows: Vec::with_capacity(rows) }
+        let block = || Block { version: None, rows: Vec::with_capacity(rows) };
+        let factor = DenseCholesky::with_capacity(if rows < MANY { rows } else { FORESEEN });
+        Self { factor, factored: block(), dependent: block(), ..Self::default() }
     }
 
-    /// Solves for `x`, which holds −q on entry. With a `shift` of the diagonal W is positive definite, and its
-    /// factorization is not reused. `Err(row)` gives a row of the problem whose W is not finite or not semidefinite.
+    /// Discards what is kept of earlier problems.
+    pub(super) fn forget(&mut self) {
+        self.factored.version = None;
+        self.dependent.version = None;
+    }
+
+    /// Solves for `x`, which holds b on entry. Returns false, without a solution, if the rows depend on one another.
+    /// `Err(row)` gives a row of the problem whose W is not finite or not semidefinite.
     pub(super) fn solve(
         &mut self,
-        (problem, extents): (&ContactProblem<'_, T>, &Extents),
-        (rows, symmetry): (&[usize], Symmetry),
-        shift: Option<&[T]>,
+        problem: &ContactProblem<'_, T>,
+        structure: &Structure,
+        (rows, shift): (&[usize], T),
         x: &mut [T],
-    ) -> Result<Solved, usize> {
-        let known = self.version > 0 && self.version == problem.version && self.rows == rows && shift.is_none();
-        if !known {
-            self.version = 0;
-            let iterates = rows.len() >= MANY && symmetry == Symmetry::Symmetric && shift.is_none();
-            match iterates && self.many.prepare(problem, extents, rows) {
-                true => self.method = Method::Iteration,
-                false => self.factorize(problem, (rows, symmetry), shift)?,
-            }
+    ) -> Result<bool, usize> {
+        let plain = shift == T::zero();
+        if plain && self.dependent.is(problem.version, rows) {
+            return Ok(false);
         }
-        let mut solved = Solved::Once;
-        if !(self.method == Method::Iteration && self.many.solve(problem, extents, rows, x).is_some()) {
-            if self.method == Method::Iteration {
-                self.factorize(problem, (rows, symmetry), shift)?;
+        if !(self.shift == shift && self.factored.is(problem.version, rows)) {
+            self.factored.version = None;
+            self.iterates = plain
+                && rows.len() >= MANY
+                && structure.symmetry() == Symmetry::Symmetric
+                && self.many.prepare(problem, structure, rows);
+            if !self.iterates {
+                self.factorize(problem, structure, (rows, shift))?;
             }
-            if self.factor.is_singular() {
-                solved = if symmetry == Symmetry::General { Solved::Not } else { Solved::LeastNorm };
-            }
-            if solved != Solved::Not {
-                self.factor.solve(x);
-            }
+            self.factored.set(problem.version, rows);
+            self.shift = shift;
         }
-        if shift.is_none() {
-            self.version = problem.version;
-            self.rows.clear();
-            self.rows.extend_from_slice(rows);
+        if self.iterates {
+            if self.many.solve(problem, structure, rows, x).is_some() {
+                return Ok(true);
+            }
+            self.iterates = false;
+            self.factored.version = None;
+            self.factorize(problem, structure, (rows, shift))?;
+            self.factored.set(problem.version, rows);
         }
-        Ok(solved)
+        if self.factor.is_singular() {
+            self.dependent.set(problem.version, rows);
+            return Ok(false);
+        }
+        self.factor.solve(x);
+        Ok(true)
     }
 
     fn factorize(
         &mut self,
         problem: &ContactProblem<'_, T>,
-        (rows, symmetry): (&[usize], Symmetry),
-        shift: Option<&[T]>,
+        structure: &Structure,
+        (rows, shift): (&[usize], T),
     ) -> Result<(), usize> {
-        self.method = Method::Factor;
-        self.version = 0;
         let entry = |i: usize, j: usize| {
-            let w = problem.row(rows[i])[rows[j]];
-            let own = shift.filter(|_| i == j).map_or(T::zero(), |shift| shift[rows[i]]);
-            w + own
+            let w = problem.delassus(rows[i], rows[j]);
+            if i == j { w + shift } else { w }
         };
-        let done = match symmetry {
+        let done = match structure.symmetry() {
             Symmetry::Symmetric => self.factor.factorize(rows.len(), entry),
             Symmetry::General => self.factor.factorize_general(rows.len(), entry),
         };

@@ -1,8 +1,8 @@
 //! Projected Gauss–Seidel: row by row, robust, for many rows and moderate accuracy.
 
 use super::acceptance::Settings;
-use super::blocks::{BlockAcceptance, failure};
-use super::sweeps::Sweeps;
+use super::structure::Structure;
+use super::sweeps::{Schedule, Sweeps};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -15,7 +15,7 @@ use crate::real::Real;
 /// ```
 ///
 /// C. W. Cryer, The solution of a quadratic programming problem using systematic overrelaxation (SIAM J. Control 9,
-/// 1971). It needs no memory (with friction two numbers per row) and O(n²) operations per sweep. It converges for
+/// 1971). It needs two numbers of memory per row and O(n²) operations per sweep. It converges for
 /// every positive semi-definite W, so also with redundant rows, if the problem has a solution and 0 < ω < 2 (Luo and
 /// Tseng, SIAM J. Control Optim. 29, 1991, and J. Optim. Theory Appl. 72, 1992). y is then unique, the multipliers
 /// are not: they depend on the guess and on the order of the rows.
@@ -51,12 +51,14 @@ use crate::real::Real;
 pub struct GaussSeidel<T = f64> {
     relaxation: T,
     settings: Settings<T>,
-    memory: Sweeps<T>,
+    structure: Structure,
+    sweeps: Sweeps<T>,
 }
 
 impl<T: Real> Default for GaussSeidel<T> {
     fn default() -> Self {
-        Self { relaxation: T::one(), settings: Settings::default(), memory: Sweeps::default() }
+        let (settings, structure, sweeps) = (Settings::default(), Structure::default(), Sweeps::default());
+        Self { relaxation: T::one(), settings, structure, sweeps }
     }
 }
 
@@ -90,68 +92,33 @@ impl<T: Real> GaussSeidel<T> {
     }
 }
 
-impl<T: Real> GaussSeidel<T> {
-    /// Sweeps over blocks, for problems with friction.
-    fn solve_blocks(
-        &mut self,
-        problem: &ContactProblem<'_, T>,
-        multipliers: &mut [T],
-    ) -> std::result::Result<usize, ContactFailure<T>> {
-        let acceptance = BlockAcceptance::begin(problem, self.settings.tolerance(), multipliers)?;
-        let (limit, mut spent) = (self.settings.iterations, 0);
-        self.memory.reset();
-        match acceptance.sweep(problem, (&mut self.memory, self.relaxation), limit, false, (&mut spent, multipliers)) {
-            true => Ok(spent),
-            false => Err(failure(problem, spent, multipliers)),
-        }
-    }
-}
-
-/// Closes the gap of a row without friction within the bounds of its multiplier; a row without W_ii is skipped.
-fn relax_row<T: Real>(
-    problem: &ContactProblem<'_, T>,
-    (row, set): (usize, AdmissibleSet),
-    omega: T,
-    multipliers: &mut [T],
-) {
-    let diagonal = problem.delassus(row, row);
-    if diagonal > T::zero() {
-        let correction = omega * problem.gap(row, multipliers) / diagonal;
-        multipliers[row] = set.nearest(multipliers[row] - correction);
-    }
-}
-
-/// One sweep with relaxation factor `omega`; rows without W_ii are skipped.
-pub(super) fn sweep_rows<T: Real>(problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) {
-    for (i, &set) in problem.sets.iter().enumerate() {
-        relax_row(problem, (i, set), omega, multipliers);
-    }
-}
-
 impl<T: Real> ContactSolver<T> for GaussSeidel<T> {
     /// All sets are supported.
     fn admits(&self, _set: AdmissibleSet) -> bool {
         true
     }
 
-    fn reserve(&mut self, _size: usize) {}
+    fn reserve(&mut self, size: usize) {
+        self.structure = Structure::with_capacity(size);
+        self.sweeps = Sweeps::with_capacity(size);
+    }
 
     fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
-        if problem.has_cones() {
-            return self.solve_blocks(problem, multipliers);
+        let Self { relaxation: omega, settings, structure, sweeps } = self;
+        let known = structure.is_known(problem);
+        let acceptance = settings.begin(problem, known, multipliers)?;
+        if !known {
+            structure.find(problem);
         }
-        let mut acceptance = self.settings.begin(problem, multipliers)?;
-        for sweep in 0..self.settings.iterations {
-            if acceptance.accepts(multipliers) {
-                return Ok(sweep);
-            }
-            sweep_rows(problem, self.relaxation, multipliers);
+        let schedule = Schedule { omega: *omega, sweeps: settings.iterations, impatient: false };
+        let mut spent = 0;
+        match sweeps.solve(&acceptance, structure.symmetry(), schedule, &mut spent, multipliers) {
+            true => Ok(spent),
+            false => Err(acceptance.failure(spent, multipliers)),
         }
-        let sweeps = self.settings.iterations;
-        if acceptance.accepts(multipliers) { Ok(sweeps) } else { Err(acceptance.failure(sweeps, multipliers)) }
     }
 }

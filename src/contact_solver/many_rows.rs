@@ -6,9 +6,10 @@
 //! then does not grow with the number of rows.
 
 use super::ContactProblem;
-use super::extents::Extents;
+use super::structure::Structure;
 use crate::dense::dot;
 use crate::real::Real;
+use crate::rounding::{half_digits, rounding};
 
 /// Entries in a row of the approximate inverse, at most.
 const WIDTH: usize = 20;
@@ -18,9 +19,6 @@ const ITERATIONS: usize = 300;
 
 /// Restarts of conjugate gradients from the recomputed residual.
 const REFINEMENTS: usize = 3;
-
-/// Tolerated residual of an equation, in roundings of its terms.
-const ROUNDINGS: f64 = 4.0;
 
 /// W on the active rows, with its approximate inverse.
 #[derive(Clone, Debug, Default)]
@@ -37,7 +35,7 @@ pub(super) struct ManyRows<T> {
     block: Vec<T>,
     /// Vectors of the iteration, one entry per active row: residual, preconditioned residual, H r, b.
     residual: Vec<T>,
-    pushed: Vec<T>,
+    preconditioned: Vec<T>,
     inner: Vec<T>,
     right: Vec<T>,
     /// Direction and its product, one entry per row of the problem.
@@ -48,7 +46,7 @@ pub(super) struct ManyRows<T> {
 impl<T: Real> ManyRows<T> {
     /// Computes the approximate inverse for the active `rows` (ascending). Returns false if some row depends on its
     /// neighbors.
-    pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) -> bool {
+    pub(super) fn prepare(&mut self, problem: &ContactProblem<'_, T>, structure: &Structure, rows: &[usize]) -> bool {
         let Self { starts, places, values, scale, near, block, .. } = self;
         starts.clear();
         places.clear();
@@ -56,7 +54,7 @@ impl<T: Real> ManyRows<T> {
         scale.clear();
         starts.push(0);
         // Lower bound of a pivot, in a block scaled to a unit diagonal.
-        let least = T::epsilon().sqrt();
+        let least = half_digits();
         for (k, &row) in rows.iter().enumerate() {
             let own = problem.row(row);
             if own[row] <= T::zero() || !own[row].is_finite() {
@@ -64,7 +62,7 @@ impl<T: Real> ManyRows<T> {
             }
             scale.push(own[row].sqrt().recip());
             near.clear();
-            let first = rows[..k].partition_point(|&i| i < extents.of(row).start);
+            let first = rows[..k].partition_point(|&i| i < structure.range(row).start);
             let before = rows[first..k].iter().zip(&scale[first..]).zip(first..);
             near.extend(before.map(|((&i, &s), j)| ((own[i] * s).abs(), j)));
             if near.len() >= WIDTH {
@@ -107,12 +105,12 @@ impl<T: Real> ManyRows<T> {
     pub(super) fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,
-        extents: &Extents,
+        structure: &Structure,
         rows: &[usize],
         x: &mut [T],
     ) -> Option<usize> {
         let (count, size) = (rows.len(), problem.size());
-        for vector in [&mut self.residual, &mut self.pushed, &mut self.inner] {
+        for vector in [&mut self.residual, &mut self.preconditioned, &mut self.inner] {
             vector.clear();
             vector.resize(count, T::zero());
         }
@@ -133,12 +131,12 @@ impl<T: Real> ManyRows<T> {
                 break;
             }
             // As accurate as the recurrence allows.
-            let goal = T::epsilon() * T::of(0.25) * start;
-            match self.iterate((problem, extents), rows, x, goal, ITERATIONS - iterations) {
+            let goal = T::epsilon() * start;
+            match self.iterate((problem, structure), rows, x, goal, ITERATIONS - iterations) {
                 Some(spent) => iterations += spent,
                 None => break,
             }
-            solved = self.refresh((problem, extents), rows, &b, x);
+            solved = self.refresh((problem, structure), rows, &b, x);
         }
         if !solved {
             x.copy_from_slice(&b);
@@ -155,7 +153,7 @@ impl<T: Real> ManyRows<T> {
     /// Updates x until the residual is at most `goal`.
     fn iterate(
         &mut self,
-        (problem, extents): (&ContactProblem<'_, T>, &Extents),
+        (problem, structure): (&ContactProblem<'_, T>, &Structure),
         rows: &[usize],
         x: &mut [T],
         goal: T,
@@ -167,13 +165,13 @@ impl<T: Real> ManyRows<T> {
                 return Some(iteration);
             }
             self.precondition();
-            let now = dot(&self.residual, &self.pushed);
+            let now = dot(&self.residual, &self.preconditioned);
             let share = if iteration == 0 { T::zero() } else { now / before };
             before = now;
-            for (&row, &z) in rows.iter().zip(&self.pushed) {
+            for (&row, &z) in rows.iter().zip(&self.preconditioned) {
                 self.direction[row] = z + share * self.direction[row];
             }
-            self.multiply(problem, extents, rows);
+            self.multiply(problem, structure, rows);
             let curvature = rows.iter().map(|&row| self.direction[row] * self.product[row]).sum::<T>();
             // W is not positive definite along the direction, or a value is NaN.
             let sound = curvature > T::zero() && now > T::zero();
@@ -191,26 +189,26 @@ impl<T: Real> ManyRows<T> {
 
     /// Hᵀ H r.
     fn precondition(&mut self) {
-        let Self { starts, places, values, residual, pushed, inner, .. } = self;
+        let Self { starts, places, values, residual, preconditioned, inner, .. } = self;
         for (range, inner) in starts.windows(2).zip(inner.iter_mut()) {
             let range = range[0]..range[1];
             *inner = places[range.clone()].iter().zip(&values[range]).map(|(&j, &h)| h * residual[j]).sum();
         }
-        pushed.fill(T::zero());
+        preconditioned.fill(T::zero());
         for (range, &inner) in starts.windows(2).zip(inner.iter()) {
             let range = range[0]..range[1];
             for (&j, &h) in places[range.clone()].iter().zip(&values[range]) {
-                pushed[j] += h * inner;
+                preconditioned[j] += h * inner;
             }
         }
     }
 
     /// The product of W with the direction on the active rows. Only the lower triangle of W is read.
-    fn multiply(&mut self, problem: &ContactProblem<'_, T>, extents: &Extents, rows: &[usize]) {
+    fn multiply(&mut self, problem: &ContactProblem<'_, T>, structure: &Structure, rows: &[usize]) {
         let Self { direction, product, .. } = self;
         product.fill(T::zero());
         for &row in rows {
-            let (first, p) = (extents.of(row).start, direction[row]);
+            let (first, p) = (structure.range(row).start, direction[row]);
             let left = &problem.row(row)[first..=row];
             let sum = dot(left, &direction[first..=row]);
             T::axpy(p, &left[..row - first], &mut product[first..row]);
@@ -221,7 +219,7 @@ impl<T: Real> ManyRows<T> {
     /// Recomputes the residual; returns whether every equation is met to the rounding of its terms.
     fn refresh(
         &mut self,
-        (problem, extents): (&ContactProblem<'_, T>, &Extents),
+        (problem, structure): (&ContactProblem<'_, T>, &Structure),
         rows: &[usize],
         b: &[T],
         x: &[T],
@@ -233,11 +231,11 @@ impl<T: Real> ManyRows<T> {
         }
         let mut met = true;
         for ((&row, &b), r) in rows.iter().zip(b).zip(residual.iter_mut()) {
-            let range = extents.of(row);
+            let range = structure.range(row);
             let (own, direction) = (&problem.row(row)[range.clone()], &direction[range]);
             *r = b - dot(own, direction);
             let terms = b.abs() + own.iter().zip(direction).map(|(w, x)| (*w * *x).abs()).sum::<T>();
-            met &= r.abs() <= T::of(ROUNDINGS) * T::epsilon() * terms;
+            met &= r.abs() <= rounding(terms);
         }
         direction.fill(T::zero());
         met
@@ -300,11 +298,11 @@ mod tests {
                 let problem = problem(&w, &b, &sets);
                 let rows: Vec<usize> = (0..n).filter(|i| i % 7 != 3).collect();
                 let mut many = ManyRows::default();
-                let mut extents = Extents::default();
-                extents.find(&problem);
-                assert!(many.prepare(&problem, &extents, &rows));
+                let mut structure = Structure::default();
+                structure.find(&problem);
+                assert!(many.prepare(&problem, &structure, &rows));
                 let mut x: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
-                *most = many.solve(&problem, &extents, &rows, &mut x).unwrap();
+                *most = many.solve(&problem, &structure, &rows, &mut x).unwrap();
                 let mut factor = DenseCholesky::with_capacity(n);
                 factor.factorize(rows.len(), |i, j| w[rows[i] * n + rows[j]]).unwrap();
                 let mut direct: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
@@ -331,9 +329,9 @@ mod tests {
         }
         let (q, sets, rows) = (vec![0.0; n], vec![AdmissibleSet::Free; n], (0..n).collect::<Vec<_>>());
         let prepares = |w: &[f64]| {
-            let (problem, mut extents) = (problem(w, &q, &sets), Extents::default());
-            extents.find(&problem);
-            ManyRows::default().prepare(&problem, &extents, &rows)
+            let (problem, mut structure) = (problem(w, &q, &sets), Structure::default());
+            structure.find(&problem);
+            ManyRows::default().prepare(&problem, &structure, &rows)
         };
         assert!(!prepares(&w));
         w[5 * n + 5] = 0.0;

@@ -1,17 +1,18 @@
 //! Principal pivoting: exact for every positive semi-definite W, with a proof if there is no solution.
 
 use super::acceptance::Settings;
-use super::gauss_seidel::sweep_rows;
+use super::structure::Symmetry;
+use super::sweeps::{Schedule, Sweeps};
 use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::dense::dot;
 use crate::real::Real;
+use crate::rounding::{rounding, share_of_rounding};
 
 /// Principal pivoting on the dense Delassus operator, including redundant rows: the reference solver.
 ///
 /// The method of Dantzig, van de Panne and Whinston for symmetric W (Cottle, Pang and Stone, The Linear
-/// Complementarity Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). Free
-/// rows become active first. Then the most violated row p is driven: λ_p grows, while the active rows keep y = 0,
-/// until
+/// Complementarity Problem, ch. 4), in the factorized form of Goldfarb and Idnani (Math. Program. 27, 1983). The most
+/// violated row p is driven: λ_p grows, or falls if it is free and y_p > 0, while the active rows keep y = 0, until
 ///
 /// * y_p = 0: p becomes active, or
 /// * an active λ_j = 0: j leaves, and p is driven on, or
@@ -56,6 +57,7 @@ use crate::real::Real;
 pub struct Pivoting<T = f64> {
     basis: Basis<T>,
     status: Vec<Status>,
+    sweeps: Sweeps<T>,
 }
 
 /// Limit of Gauss–Seidel sweeps if the active block, though independent, is so badly conditioned that implied rows
@@ -146,46 +148,10 @@ impl<T: Real> Basis<T> {
         let slope = row[p] - dot(entry, entry);
         let size = |(&j, r): (&usize, &T)| problem.delassus(j, j).sqrt() * r.abs();
         let length = row[p].sqrt() + rows.iter().zip(direction.iter()).map(size).sum::<T>();
-        let dependent = slope <= T::of(32.0) * T::epsilon() * length * length;
+        let dependent = slope <= rounding(length * length);
         // A direction is known to the rounding of W times its condition; a smaller pivot would produce huge
         // multipliers.
-        Response {
-            slope: if dependent { T::zero() } else { slope },
-            noise: T::epsilon().powf(T::of(2.0 / 3.0)) * length,
-        }
-    }
-
-    /// Makes all independent free rows active: Cholesky with diagonal pivoting, the most independent row first.
-    ///
-    /// The remaining free rows are combinations of these; the acceptance rule checks whether their q is consistent.
-    fn enter_free(&mut self, problem: &ContactProblem<'_, T>) {
-        let Self { rows, factor, stride, right: rest, .. } = self;
-        let is_free = |&i: &usize| problem.sets[i] == AdmissibleSet::Free && problem.delassus(i, i) > T::zero();
-        rows.extend((0..problem.size()).filter(is_free));
-        rest.clear();
-        rest.extend(rows.iter().map(|&i| problem.delassus(i, i)));
-        for k in 0..rows.len() {
-            let share = |at: usize| rest[at] / problem.delassus(rows[at], rows[at]);
-            let best = (k + 1..rows.len()).fold(k, |best, at| if share(at) > share(best) { at } else { best });
-            if share(best) <= T::of(16.0 * problem.size() as f64) * T::epsilon() {
-                rows.truncate(k);
-                return;
-            }
-            rows.swap(k, best);
-            rest.swap(k, best);
-            for c in 0..k {
-                factor.swap(k * *stride + c, best * *stride + c);
-            }
-            let pivot = rest[k].sqrt();
-            factor[k * *stride + k] = pivot;
-            for i in k + 1..rows.len() {
-                let (done, below) = factor.split_at_mut(i * *stride);
-                let done = &done[k * *stride..k * *stride + k];
-                let entry = (problem.delassus(rows[i], rows[k]) - dot(done, &below[..k])) / pivot;
-                below[k] = entry;
-                rest[i] -= entry * entry;
-            }
-        }
+        Response { slope: if dependent { T::zero() } else { slope }, noise: share_of_rounding::<T>() * length }
     }
 
     /// Makes the driven row active.
@@ -249,10 +215,17 @@ impl<T: Real> Basis<T> {
         hardest.map_or(p, |k| self.rows[k])
     }
 
-    /// The largest growth of λ_p before an active multiplier is zero, and the position of that row.
-    fn blocking(&self, problem: &ContactProblem<'_, T>, noise: T, multipliers: &[T]) -> Option<(usize, T)> {
+    /// The largest change of λ_p, in the direction of the sign, before an active multiplier is zero, and the position
+    /// of that row.
+    fn blocking(
+        &self,
+        problem: &ContactProblem<'_, T>,
+        (sign, noise): (T, T),
+        multipliers: &[T],
+    ) -> Option<(usize, T)> {
         let mut first: Option<(usize, T, T)> = None;
         for (k, (&j, &r)) in self.rows.iter().zip(&self.direction).enumerate() {
+            let r = sign * r;
             let pivot = -r * problem.delassus(j, j).sqrt();
             if problem.sets[j] == AdmissibleSet::NonNegative && pivot > noise {
                 let step = multipliers[j].max(T::zero()) / -r;
@@ -272,11 +245,9 @@ impl<T: Real> Pivoting<T> {
         let mut worst: Option<(usize, T)> = None;
         for i in 0..problem.size() {
             let diagonal = problem.delassus(i, i);
-            if problem.sets[i] == AdmissibleSet::NonNegative
-                && self.status[i] == Status::Inactive
-                && diagonal > T::zero()
-            {
+            if self.status[i] == Status::Inactive && diagonal > T::zero() {
                 let y = problem.gap(i, multipliers);
+                let y = if problem.sets[i] == AdmissibleSet::Free { -y.abs() } else { y };
                 let scaled = y / diagonal.sqrt();
                 if worst.is_none_or(|(_, least)| scaled < least) && y < -problem.rounding(i, multipliers) {
                     worst = Some((i, scaled));
@@ -295,17 +266,21 @@ impl<T: Real> Pivoting<T> {
         pivots: &mut usize,
         limit: usize,
     ) -> Result<(), ContactFailure<T>> {
-        let Self { basis, status } = self;
+        let Self { basis, status, .. } = self;
         while *pivots < limit {
             let Response { slope, noise } = basis.drive(problem, p);
-            let y = problem.gap(p, multipliers);
+            let gap = problem.gap(p, multipliers);
+            // The multiplier of a free row may fall.
+            let sign = if problem.sets[p] == AdmissibleSet::Free && gap > T::zero() { -T::one() } else { T::one() };
+            let y = sign * gap;
             if multipliers[p] == T::zero() && y >= -basis.rounding(problem, p, multipliers) {
                 status[p] = Status::Implied;
                 return Ok(());
             }
             *pivots += 1;
             let closing = (slope > T::zero()).then(|| (-y / slope).max(T::zero()));
-            let blocking = basis.blocking(problem, if closing.is_some() { T::zero() } else { noise }, multipliers);
+            let blocking =
+                basis.blocking(problem, (sign, if closing.is_some() { T::zero() } else { noise }), multipliers);
             match (closing, blocking) {
                 (None, None) => {
                     return Err(ContactFailure::Contradictory {
@@ -315,7 +290,7 @@ impl<T: Real> Pivoting<T> {
                     });
                 }
                 (closing, Some((k, step))) if closing.is_none_or(|closing| step < closing) => {
-                    multipliers[p] += step;
+                    multipliers[p] += sign * step;
                     let row = basis.leave(k);
                     multipliers[row] = T::zero();
                     status[row] = Status::Inactive;
@@ -341,22 +316,18 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
     fn reserve(&mut self, size: usize) {
         self.basis.reserve(size);
         self.status = Vec::with_capacity(size);
+        self.sweeps = Sweeps::with_capacity(size);
     }
 
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
         let size = problem.size();
         multipliers.fill(T::zero());
-        let mut acceptance = Settings::default().begin(problem, multipliers)?;
         problem.check_symmetric()?;
+        let acceptance = Settings::default().begin(problem, false, multipliers)?;
         self.basis.clear(size);
         self.status.clear();
         self.status.resize(size, Status::Inactive);
-        self.basis.enter_free(problem);
-        self.basis.close(problem, multipliers);
-        for &row in &self.basis.rows {
-            self.status[row] = Status::Active;
-        }
-        let mut pivots = self.basis.rows.len();
+        let mut pivots = 0;
         // Far above any observed count.
         let limit = 100 + 20 * size;
         while pivots < limit {
@@ -368,11 +339,9 @@ impl<T: Real> ContactSolver<T> for Pivoting<T> {
         for (lambda, set) in multipliers.iter_mut().zip(problem.sets) {
             *lambda = set.nearest(*lambda);
         }
-        for _ in 0..POLISH {
-            if acceptance.accepts(multipliers) {
-                return Ok(pivots);
-            }
-            sweep_rows(problem, T::one(), multipliers);
+        let schedule = Schedule { omega: T::one(), sweeps: POLISH, impatient: false };
+        if self.sweeps.solve(&acceptance, Symmetry::Symmetric, schedule, &mut pivots, multipliers) {
+            return Ok(pivots);
         }
         Err(acceptance.failure(pivots, multipliers))
     }
@@ -389,7 +358,7 @@ mod tests {
         let problem = ContactProblem::new(&w, &[-1.0; 3], &sets, &[0.0; 3]).unwrap();
         for rows in [vec![0, 1], vec![1, 0]] {
             let basis = Basis { rows, direction: vec![-0.5; 2], ..Basis::default() };
-            let (position, step): (usize, f64) = basis.blocking(&problem, 1e-9, &[2.0, 2.0, 0.0]).unwrap();
+            let (position, step): (usize, f64) = basis.blocking(&problem, (1.0, 1e-9), &[2.0, 2.0, 0.0]).unwrap();
             assert_eq!((basis.rows[position], step.to_bits()), (1, 4.0_f64.to_bits()));
         }
     }

@@ -5,6 +5,7 @@ use crate::contact::ContactLaw;
 use crate::dense::dot;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use std::ops::Range;
 
 /// The set of the multipliers of a block of rows, which also determines the conditions between them and the block's
@@ -158,14 +159,14 @@ fn cone_residuals<T: Real>(
     }
     let tangential = compliance[1..].iter().fold(T::zero(), |most, &w| most.max(w));
     let mut miss = [T::zero(); 2];
-    let mut aim = [T::zero(); 2];
-    for (k, aim) in aim.iter_mut().enumerate().take(y.len() - 1) {
-        *aim = tangential * multipliers[k + 1] - y[k + 1];
+    let mut augmented = [T::zero(); 2];
+    for (k, augmented) in augmented.iter_mut().enumerate().take(y.len() - 1) {
+        *augmented = tangential * multipliers[k + 1] - y[k + 1];
     }
-    let (size, radius) = (norm(&aim), tangential * friction * multipliers[0].max(T::zero()));
+    let (size, radius) = (norm(&augmented), tangential * friction * multipliers[0].max(T::zero()));
     let share = if size > radius { radius / size } else { T::one() };
     for (k, miss) in miss.iter_mut().enumerate().take(y.len() - 1) {
-        *miss = tangential * multipliers[k + 1] - share * aim[k];
+        *miss = tangential * multipliers[k + 1] - share * augmented[k];
     }
     let normal = if is_bilateral { y[0] } else { y[0].min(compliance[0] * multipliers[0]) };
     [normal.abs(), norm(&miss)]
@@ -306,21 +307,12 @@ impl<'a, T: Real> ContactProblem<'a, T> {
     /// Rounding of y_i: its tolerance, plus the rounding of the sum `(W λ + q)_i`.
     pub fn rounding(&self, i: usize, multipliers: &[T]) -> T {
         let terms = self.row(i).iter().zip(multipliers).map(|(&w, &lambda)| (w * lambda).abs());
-        self.rounding_of(i, self.offset[i].abs() + terms.sum::<T>())
-    }
-
-    /// The same for zero multipliers.
-    pub(super) fn rounding_idle(&self, i: usize) -> T {
-        self.rounding_of(i, self.offset[i].abs())
-    }
-
-    fn rounding_of(&self, i: usize, terms: T) -> T {
-        self.tolerance[i] + T::of(32.0) * T::epsilon() * terms
+        self.tolerance[i] + rounding(self.offset[i].abs() + terms.sum::<T>())
     }
 
     /// The row, or first row of a block, with the largest [`AdmissibleSet::residual`], and that residual (unit of y).
     pub fn residual(&self, multipliers: &[T]) -> (usize, T) {
-        let worst = |worst: (usize, T), (row, miss): (usize, T)| if miss > worst.1 { (row, miss) } else { worst };
+        let worst = |worst: (usize, T), x: (usize, T)| if x.1 > worst.1 || x.1.is_nan() { x } else { worst };
         let misses = self.blocks().map(|(rows, set)| {
             let [first, tangential] = self.block_misses(rows.clone(), set, multipliers);
             (rows.start, first.max(tangential))
@@ -339,11 +331,6 @@ impl<'a, T: Real> ContactProblem<'a, T> {
             Some(friction) => cone_residuals((T::of(friction), set.is_bilateral()), y, multipliers, compliance),
             None => [set.residual(y, multipliers, compliance), T::zero()],
         }
-    }
-
-    /// Residual of row i, in a problem whose sets have one row each.
-    pub(super) fn miss(&self, i: usize, multipliers: &[T]) -> T {
-        self.sets[i].residual(&[self.gap(i, multipliers)], &[multipliers[i]], &[self.delassus(i, i)])
     }
 
     /// Whether any block is a cone.

@@ -106,31 +106,23 @@ impl<T: Real> Memory<T> {
         evaluate(problem, multipliers, &mut self.gaps);
     }
 
-    /// Whether the curvature of W along the step is at most L, so that the step cannot overshoot. One of two small
-    /// differences is scaled by the largest, because their product may underflow.
+    /// Whether the curvature of W along the step is at most L, so that the step cannot overshoot.
     fn is_bounded(&self, problem: &ContactProblem<'_, T>, lipschitz: T, multipliers: &[T]) -> bool {
-        let largest = farthest(&self.ahead, multipliers);
-        if largest == 0.0 {
-            return true;
-        }
-        let mut sums = (0.0, 0.0);
+        let (mut change, mut length) = (0.0, 0.0);
         for (i, (&new, &ahead)) in multipliers.iter().zip(&self.ahead).enumerate() {
             let difference = (new - ahead).value();
-            let share = difference / largest;
-            sums.0 += share * (self.gaps[i] - self.ahead_gaps[i]).value();
-            sums.1 += share * difference * problem.delassus(i, i).value();
+            change += difference * (self.gaps[i] - self.ahead_gaps[i]).value();
+            length += difference * difference * problem.delassus(i, i).value();
         }
-        sums.0 <= lipschitz.value() * sums.1
+        change <= lipschitz.value() * length
     }
 
     /// Whether the momentum points uphill.
     fn is_uphill(&self, problem: &ContactProblem<'_, T>, multipliers: &[T]) -> bool {
-        let largest = farthest(&self.old, multipliers);
         let product = |(i, &new): (usize, &T)| {
-            let share = (new - self.old[i]).value() / largest;
-            problem.delassus(i, i).value() * ((self.ahead[i] - new).value() * share)
+            problem.delassus(i, i).value() * (self.ahead[i] - new).value() * (new - self.old[i]).value()
         };
-        largest > 0.0 && multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
+        multipliers.iter().enumerate().map(product).sum::<f64>() > 0.0
     }
 
     /// Extrapolates from the iterate, with this share of the last step as momentum.
@@ -142,11 +134,6 @@ impl<T: Real> Memory<T> {
             *old = new;
         }
     }
-}
-
-/// The largest change from one list to another.
-fn farthest<T: Real>(from: &[T], to: &[T]) -> f64 {
-    from.iter().zip(to).fold(0.0, |most: f64, (&from, &to)| most.max((to - from).value().abs()))
 }
 
 /// y = W λ + q.
@@ -187,8 +174,8 @@ impl<T: Real> ContactSolver<T> for ProjectedGradient<T> {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>> {
         let Self { settings, memory } = self;
-        let mut acceptance = settings.begin(problem, multipliers)?;
         problem.check_symmetric()?;
+        let acceptance = settings.begin(problem, false, multipliers)?;
         let bound = memory.begin(problem, multipliers);
         let (mut lipschitz, mut age) = (T::one(), T::one());
         for iteration in 0..settings.iterations {

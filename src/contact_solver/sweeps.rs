@@ -1,69 +1,110 @@
 //! Sweeps over the blocks of a problem with cones: each block in turn is solved while the others keep their
 //! multipliers.
 
+use super::acceptance::Acceptance;
 use super::cone::Cone;
+use super::structure::Symmetry;
 use super::{AdmissibleSet, ContactProblem};
 use crate::real::Real;
+use crate::rounding::rounding;
 use std::ops::Range;
 
 /// The memory of sweeps. A symmetric W is read once per sweep, row by row up to the diagonal: the contributions of
-/// later blocks to a row were summed when their rows were read, in the previous sweep. W is taken as symmetric until
-/// a result shows that it is not.
+/// later blocks to a row were summed when their rows were read, in the previous sweep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweeps<T> {
-    /// Whether W is symmetric, if known.
-    is_symmetric: Option<bool>,
+    symmetry: Symmetry,
     /// Σ W λ over the blocks after each row: with their present multipliers, and with the ones from this sweep.
     behind: Vec<T>,
     next: Vec<T>,
 }
 
+/// Relaxation factor and limit of sweeps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Schedule<T> {
+    pub(super) omega: T,
+    pub(super) sweeps: usize,
+    /// Whether sweeps end once the change per sweep hardly decreases.
+    pub(super) impatient: bool,
+}
+
 impl<T: Real> Sweeps<T> {
-    /// Discards the symmetry of another problem.
-    pub(super) fn reset(&mut self) {
-        self.is_symmetric = None;
+    /// Memory for this many rows.
+    pub(super) fn with_capacity(rows: usize) -> Self {
+        Self { symmetry: Symmetry::Symmetric, behind: Vec::with_capacity(rows), next: Vec::with_capacity(rows) }
     }
 
-    /// Whether W was taken as symmetric but is not; from then on all of it is read.
-    pub(super) fn is_mistaken(&mut self, problem: &ContactProblem<'_, T>) -> bool {
-        /// Roundings by which a symmetric W may differ across its diagonal.
-        const ROUNDED: f64 = 64.0;
-        if self.is_symmetric.is_some() {
-            return false;
+    /// Sweeps until the problem is solved; returns whether it is solved and counts the sweeps.
+    pub(super) fn solve(
+        &mut self,
+        acceptance: &Acceptance<'_, T>,
+        symmetry: Symmetry,
+        schedule: Schedule<T>,
+        spent: &mut usize,
+        multipliers: &mut [T],
+    ) -> bool {
+        /// Interval of sweeps in which the change must halve; otherwise it may be rounding already.
+        const LOOK: usize = 8;
+        /// Growth of the change that counts as divergence, possible for an unsymmetric W; the multipliers are then
+        /// discarded.
+        const DIVERGES: f64 = 1e3;
+        // If zero forces solve the problem within rounding, they are kept: a force due to rounding would select a
+        // friction.
+        if acceptance.accepts(multipliers) {
+            return true;
         }
-        let symmetric = problem.asymmetry(T::of(ROUNDED) * T::epsilon()).is_none();
-        self.is_symmetric = Some(symmetric);
-        !symmetric
-    }
-
-    /// Reads all of W from the next sweep on.
-    pub(super) fn read_all(&mut self) {
-        self.is_symmetric = Some(false);
-    }
-
-    /// Whether W is read up to its diagonal only.
-    fn reads_half(&self) -> bool {
-        self.is_symmetric != Some(false)
+        let problem = acceptance.problem();
+        self.symmetry = symmetry;
+        self.begin(problem, multipliers);
+        let (mut before, mut least) = (T::infinity(), T::infinity());
+        for sweep in 1..=schedule.sweeps {
+            let change = self.sweep(problem, schedule.omega, multipliers);
+            *spent += 1;
+            least = least.min(change);
+            // NaN diverges.
+            let bounded = change <= T::of(DIVERGES) * least && change.is_finite();
+            if !bounded {
+                multipliers.fill(T::zero());
+                return false;
+            }
+            let looks = sweep.is_multiple_of(LOOK);
+            let stalls = looks && change > T::of(0.5) * before;
+            if (stalls || change <= acceptance.accepted() || sweep == schedule.sweeps)
+                && acceptance.accepts(multipliers)
+            {
+                return true;
+            }
+            if stalls && schedule.impatient {
+                break;
+            }
+            if looks {
+                before = change;
+            }
+        }
+        false
     }
 
     /// Starts with these multipliers.
-    pub(super) fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) {
+    fn begin(&mut self, problem: &ContactProblem<'_, T>, multipliers: &[T]) {
         if self.reads_half() {
             for values in [&mut self.behind, &mut self.next] {
                 values.clear();
                 values.resize(problem.size(), T::zero());
             }
-            if multipliers.iter().any(|&multiplier| multiplier != T::zero()) {
-                for (rows, _) in problem.blocks() {
-                    spread(problem, rows, multipliers, &mut self.behind);
-                }
+            for (rows, _) in problem.blocks() {
+                spread(problem, rows, multipliers, &mut self.behind);
             }
         }
     }
 
+    /// Whether W is read up to its diagonal only.
+    fn reads_half(&self) -> bool {
+        self.symmetry == Symmetry::Symmetric
+    }
+
     /// One sweep, relaxed by `omega`. Returns the largest change of a multiplier times its own compliance; NaN if one
     /// is NaN.
-    pub(super) fn sweep(&mut self, problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
+    fn sweep(&mut self, problem: &ContactProblem<'_, T>, omega: T, multipliers: &mut [T]) -> T {
         let mut largest = T::zero();
         for (rows, set) in problem.blocks() {
             let block = self.alone(problem, rows.clone(), set, multipliers);
@@ -141,7 +182,7 @@ pub(super) fn free_block<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<u
         delassus[i][..size].copy_from_slice(&problem.row(row)[rows.clone()]);
         offset[i] = problem.offset[row];
         if i > 0 {
-            noise = noise.max(problem.tolerance[row] + T::epsilon() * problem.offset[row].abs());
+            noise = noise.max(problem.tolerance[row] + rounding(problem.offset[row].abs()));
         }
     }
     let guess = [T::zero(); 2];

@@ -352,8 +352,7 @@ fn guess_does_not_change_the_result() {
 fn units_do_not_matter() {
     // Powers of two: the arithmetic is the same to the last bit.
     let (problem, _) = random(&mut Congruential(6), 20, 15, 32, 0.2);
-    // (In the last two a motion has died out so far that there are no squares of its numbers.)
-    for (length, force) in [(-40, 30), (-700, -650), (-700, -720)].map(|(l, f)| (2_f64.powi(l), 2_f64.powi(f))) {
+    for (length, force) in [(-40, 30), (-300, -250), (-300, -320)].map(|(l, f)| (2_f64.powi(l), 2_f64.powi(f))) {
         let mut scaled = problem.clone();
         scaled.delassus.iter_mut().for_each(|w| *w *= length / force);
         scaled.offset.iter_mut().for_each(|q| *q *= length);

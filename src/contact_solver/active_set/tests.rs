@@ -88,7 +88,7 @@ fn what_a_loaded_row_carries_into_its_neighbor_is_no_violation() {
 fn redundant_rows_share_the_force() {
     let both = [AdmissibleSet::NonNegative; 2];
     let lambda = solve(&[1.0; 4], &[-1.0, -1.0], &both, &[0.0; 2]).unwrap();
-    assert!((lambda[0] - 0.5).abs() < 1e-14 && (lambda[1] - 0.5).abs() < 1e-14, "{lambda:?}");
+    assert!((lambda[0] + lambda[1] - 1.0).abs() < 1e-14 && (lambda[0] - 0.5).abs() < 1e-11, "{lambda:?}");
     // The same dof at two gaps: only the nearer one presses, for any guess.
     for guess in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
         let lambda = solve(&[1.0; 4], &[-1.0, -0.9], &both, &guess).unwrap();
@@ -127,7 +127,7 @@ fn four_supports_of_a_rigid_table() {
         }
         // The null space is the twist (1, −1, 1, −1): none of it where all four press.
         let twist: f64 = lambda[0] - lambda[1] + lambda[2] - lambda[3];
-        assert!(lambda.contains(&0.0) || twist.abs() < 1e-12, "{lambda:?}");
+        assert!(lambda.contains(&0.0) || twist.abs() < 1e-10, "{lambda:?}");
     }
 }
 
