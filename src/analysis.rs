@@ -23,6 +23,7 @@ pub use report::{Report, report};
 pub(crate) use stability::critical_step;
 pub use stability::{ZeroStability, critical_omega, radius_at_infinity, zero_stability};
 
+use crate::rounding::ONLY_ROUNDING;
 use crate::tableau::Tableau;
 use faer::{Mat, c64};
 
@@ -87,7 +88,7 @@ pub fn period_and_damping(tableau: &Tableau, h_over_period: f64, xi: f64) -> Opt
     // The principal root is the complex one nearest to the exact exp(−ξΩ ± i Ω√(1 − ξ²)).
     let exact = ((-xi * omega).exp(), omega * (1.0 - xi * xi).max(0.0).sqrt());
     let distance = |root: &c64| (root.re - exact.0 * exact.1.cos()).hypot(root.im - exact.0 * exact.1.sin());
-    let roots = eigenvalues(tableau, omega, xi).into_iter().filter(|root| root.im > 1e-12);
+    let roots = eigenvalues(tableau, omega, xi).into_iter().filter(|root| root.im > ONLY_ROUNDING);
     let root = roots.min_by(|x, y| distance(x).total_cmp(&distance(y)))?;
     let (decay, angle) = (-root.re.hypot(root.im).ln(), root.im.atan2(root.re));
     Some((exact.1 / angle - 1.0, decay / angle))

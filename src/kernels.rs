@@ -1,7 +1,6 @@
 //! The loops that dominate the run time, generic over the scalar only; `crate::real` instantiates them for `f32` and
 //! `f64`.
 
-pub(crate) mod block_sweep;
 pub(crate) mod chain;
 pub(crate) mod cholesky;
 pub(crate) mod conjugate_gradients;
@@ -13,7 +12,6 @@ pub(crate) mod interleaved_sweep;
 pub(crate) mod lu;
 pub(crate) mod plan;
 pub(crate) mod product;
-pub(crate) mod side_by_side;
 pub(crate) mod supernodal;
 pub(crate) mod sweep;
 pub(crate) mod vector;

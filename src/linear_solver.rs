@@ -11,13 +11,14 @@ mod lu;
 mod minimum_degree;
 pub(crate) mod ordering;
 mod quotient;
+mod selection;
 mod shared;
 mod tridiagonal;
 
 pub use by_body::ByBody;
 pub(crate) use by_body::components;
 pub use cholesky::Cholesky;
-pub use conjugate_gradients::{ConjugateGradients, Preconditioner};
+pub use conjugate_gradients::ConjugateGradients;
 pub use diagonal::Diagonal;
 pub use lu::Lu;
 pub use ordering::Ordering;

@@ -6,14 +6,13 @@
 mod stored;
 
 use crate::kernels::chain::{self, Chains};
-use crate::kernels::cholesky::{self, Columns, Simplicial, Supernodal};
-use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
+use crate::kernels::cholesky::{self, RightHandSide, Simplicial, Supernodal};
+use crate::kernels::conjugate_gradients::{self, Iteration, LANES, Outcome, Vectors};
 use crate::kernels::forest::Forest;
-use crate::kernels::lu::{self, Side};
+use crate::kernels::lu;
 use crate::kernels::product::{self, LowerColumns, Tridiagonal};
-use crate::kernels::side_by_side::{self, LANES, SideVectors};
 use crate::kernels::vector::{self, Accumulate};
-use crate::kernels::{block_sweep, interleaved_sweep, supernodal, sweep};
+use crate::kernels::{interleaved_sweep, supernodal, sweep};
 use crate::scalar::Scalar;
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::sparse::SparseColMatRef;
@@ -38,37 +37,63 @@ pub trait Real:
     fn value(self) -> f64;
 }
 
-/// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
-#[doc(hidden)]
-pub trait Kernels: Sized {
+/// Declares kernels, and instantiates the generic functions that they name for both scalars.
+macro_rules! kernels {
+    ($(
+        $(#[$doc:meta])*
+        fn $name:ident $(<const $n:ident: usize>)? ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $kernel:path;
+    )*) => {
+        /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
+        #[doc(hidden)]
+        pub trait Kernels: Sized {
+            $($(#[$doc])* fn $name $(<const $n: usize>)? ($($argument: $type),*) $(-> $result)?;)*
+        }
+
+        impl Kernels for f64 {
+            $(fn $name $(<const $n: usize>)? ($($argument: $type),*) $(-> $result)? { $kernel($($argument),*) })*
+        }
+
+        impl Kernels for f32 {
+            $(fn $name $(<const $n: usize>)? ($($argument: $type),*) $(-> $result)? { $kernel($($argument),*) })*
+        }
+    };
+}
+
+kernels! {
     /// `out = c x`.
-    fn scale_into(c: Self, x: &[Self], out: &mut [Self]);
+    fn scale_into(c: Self, x: &[Self], out: &mut [Self]) = vector::scale_into;
     /// `out += c x`.
-    fn axpy(c: Self, x: &[Self], out: &mut [Self]);
+    fn axpy(c: Self, x: &[Self], out: &mut [Self]) = vector::axpy;
     /// `out += c (x − y)`.
-    fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]);
+    fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]) = vector::axpy_difference;
     /// `out = Σ c x + Σ c (x − y)` in one pass, summed in this order; without a term nothing is written.
-    fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]);
+    fn combine(
+        terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]
+    ) = vector::combine;
     /// Σ x y of several x of one length, in one pass.
-    fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N];
+    fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N] = vector::products;
     /// `out += Σ c x` of several x of one length, in one pass.
-    fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]);
+    fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]) = vector::add_all;
     /// `u += w₀ d, v += w₁ d`, and `a = w₂ d` or `a += w₂ d`, in one pass; returns whether the written values are
     /// finite.
-    fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool;
+    fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool = vector::recover;
     /// Whether every entry is finite.
-    fn all_finite(x: &[Self]) -> bool;
+    fn all_finite(x: &[Self]) -> bool = vector::all_finite;
     /// The largest |x|; NaN is ignored.
-    fn largest(x: &[Self]) -> Self;
+    fn largest(x: &[Self]) -> Self = vector::largest;
     /// `y += c A x`, any A.
-    fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]);
+    fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) = product::product;
     /// `y = c A x` or `y += c A x` for symmetric A (both triangles stored): columns are read as rows.
-    fn symmetric_product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
+    fn symmetric_product(
+        c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self], put: Accumulate
+    ) = product::symmetric_product;
     /// `y = c A x` or `y += c A x` for tridiagonal symmetric A.
-    fn tridiagonal_product(c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate);
+    fn tridiagonal_product(
+        c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate
+    ) = product::tridiagonal_product;
     /// `y += c A x` with some columns of a symmetric A from the diagonal down, and their mirror images; `y` starts at
     /// the first of the columns.
-    fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]);
+    fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]) = product::lower_product;
     /// Factorizes a simplicial L D Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of
     /// the caller.
     fn simplicial_cholesky(
@@ -77,286 +102,88 @@ pub trait Kernels: Sized {
         values: &mut [Self],
         pivots: &mut [Self],
         memory: &mut MemBuffer,
-    ) -> Result<(), usize>;
+    ) -> Result<(), usize> = cholesky::simplicial;
     /// Factorizes a supernodal L Lᵀ and writes the pivots; `Err` holds the failing index. Both in the numbering of the
     /// matrix.
     fn supernodal_cholesky(
-        problem: &supernodal::Problem<'_, Self>,
-        values: &mut [Self],
-        pivots: &mut [Self],
-    ) -> Result<(), usize>;
+        problem: &supernodal::Problem<'_, Self>, values: &mut [Self], pivots: &mut [Self]
+    ) -> Result<(), usize> = supernodal::factorize;
     /// The workspace of a thread for factorizing a matrix with this many dofs; `None` if there is no memory.
-    fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>>;
-    /// Solves in place for the columns of `rhs`, at most [`WIDEST`](interleaved_sweep::WIDEST), with a supernodal
-    /// factor. `order` lists the dofs in elimination order; `memory` has the size returned by
-    /// [`room`](interleaved_sweep::room).
-    fn supernodal_solve(factor: &Supernodal<'_, Self>, order: Option<&[usize]>, rhs: &mut [Self], memory: &mut [Self]);
+    fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>> = supernodal::workspace;
+    /// Solves in place for several right-hand sides with the trailing block of a supernodal factor.
+    fn supernodal_solve(
+        factor: &Supernodal<'_, Self>, first: usize, order: Option<&[usize]>, rhs: &mut [Self], memory: &mut [Self]
+    ) = interleaved_sweep::solve;
     /// Eliminates `columns` (in the order of elimination) of a simplicial factor: forward sweep and division by D.
-    fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
+    fn simplicial_forward(
+        factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]
+    ) = cholesky::simplicial_forward;
     /// The backward sweep over `columns`; later entries hold the solution.
-    fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]);
+    fn simplicial_backward(
+        factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]
+    ) = cholesky::simplicial_backward;
     /// Forward along two chains.
-    fn chains_forward(chains: Chains<'_, Self>);
+    fn chains_forward(chains: Chains<'_, Self>) = chain::forward;
     /// Backward along two chains, from the known values after them.
-    fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]);
+    fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]) = chain::backward;
     /// The forward sweep over `columns` of a supernodal factor.
-    fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
+    fn supernodal_forward(
+        factor: &Supernodal<'_, Self>, columns: Range<usize>, x: RightHandSide<'_, Self>
+    ) = sweep::forward;
     /// The backward sweep over `columns`; later entries hold the solution.
-    fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>);
+    fn supernodal_backward(
+        factor: &Supernodal<'_, Self>, columns: Range<usize>, x: RightHandSide<'_, Self>
+    ) = sweep::backward;
     /// The forward sweep over the interior for one right-hand side `b`, whose entries are read through `order`; `w`
     /// are the work vectors of the forest.
     fn forest_forward(
-        factor: Supernodal<'_, Self>,
-        forest: &Forest,
-        b: &[Self],
-        order: Option<&[usize]>,
-        w: &mut [Self],
-    );
+        factor: Supernodal<'_, Self>, forest: &Forest, b: &[Self], order: Option<&[usize]>, w: &mut [Self]
+    ) = sweep::forest_forward;
     /// The backward sweep over the interior.
-    fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]);
+    fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]) = sweep::forest_backward;
     /// Factorizes the lower triangle of a dense column-major matrix into L Lᵀ, in place; returns whether all pivots
     /// were positive.
-    fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool;
+    fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool = cholesky::dense;
     /// Scratch for [`dense_cholesky`](Self::dense_cholesky).
-    fn dense_cholesky_scratch(size: usize) -> StackReq;
+    fn dense_cholesky_scratch(size: usize) -> StackReq = cholesky::dense_scratch::<Self>;
     /// Solves L Lᵀ x = b in place.
-    fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]);
+    fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]) = cholesky::dense_solve;
     /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which are replaced by
     /// their inverses; `Err` is the dof of a pivot that is not positive.
     fn scale_blocks(
-        size: usize,
-        pattern: (&[usize], &[u32]),
-        values: &mut [Self],
-        diagonal: &mut [Self],
-    ) -> Result<(), usize>;
-    /// Incomplete Cholesky factor of a scaled matrix in blocks with `shift` added to the diagonal; returns whether
-    /// all pivots were positive.
-    fn incomplete_cholesky(
-        size: usize,
-        lower: &Blocks<'_, Self>,
-        shift: Self,
-        values: &mut [Self],
-        inverses: &mut [Self],
-    ) -> bool;
-    /// Solves in place with a matrix in blocks of `size`².
+        size: usize, pattern: (&[usize], &[u32]), values: &mut [Self], diagonal: &mut [Self]
+    ) -> Result<(), usize> = conjugate_gradients::scale_blocks;
+    /// Solves with a scaled matrix in blocks of `size`².
     fn conjugate_gradients(
-        size: usize,
-        iteration: &Iteration<'_, Self>,
-        b: &mut [Self],
-        vectors: Vectors<'_, Self>,
-    ) -> Outcome;
+        size: usize, iteration: &Iteration<'_, Self>, vectors: Vectors<'_, Self, 1>
+    ) -> [Outcome; 1] = conjugate_gradients::solve_blocks;
     /// Scratch for factorizing a simplicial factor.
-    fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq;
-    /// Solves for several right-hand sides with a scaled matrix, given below its diagonal entry by entry.
+    fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq = cholesky::scratch::<Self>;
+    /// Solves for several right-hand sides with a scaled matrix, given entry by entry.
     fn conjugate_gradients_side_by_side(
-        lower: &Blocks<'_, Self>,
-        ends: (f64, usize),
-        vectors: SideVectors<'_, Self>,
-    ) -> [Outcome; LANES];
+        iteration: &Iteration<'_, Self>, vectors: Vectors<'_, Self, LANES>
+    ) -> [Outcome; LANES] = conjugate_gradients::solve::<Self, 1, LANES>;
     /// Factorizes with partial pivoting; the error has the failing column in the elimination order.
     fn lu(
         symbolic: &SymbolicLu<usize>,
         a: SparseColMatRef<'_, usize, Self>,
         numeric: &mut NumericLu<usize, Self>,
         memory: &mut MemBuffer,
-    ) -> Result<(), LuError>;
-    /// Solves in place for the columns of `rhs` with A or Aᵀ.
+    ) -> Result<(), LuError> = lu::factorize;
+    /// Solves in place for the columns of `rhs`.
     fn lu_solve(
         factor: (&SymbolicLu<usize>, &NumericLu<usize, Self>),
-        side: Side,
         rhs: &mut [Self],
         columns: usize,
         memory: &mut MemBuffer,
-    );
+    ) = lu::solve;
     /// Scratch for factorizing and for solving `columns` right-hand sides.
-    fn lu_scratch(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq;
+    fn lu_scratch(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq = lu::scratch::<Self>;
 }
 
-// The generic kernels are inlined into these methods, once for each scalar.
-macro_rules! kernels {
-    ($scalar:ty) => {
-        impl Kernels for $scalar {
-            fn scale_into(c: Self, x: &[Self], out: &mut [Self]) {
-                vector::scale_into(c, x, out);
-            }
-            fn axpy(c: Self, x: &[Self], out: &mut [Self]) {
-                vector::axpy(c, x, out);
-            }
-            fn axpy_difference(c: Self, x: &[Self], y: &[Self], out: &mut [Self]) {
-                vector::axpy_difference(c, x, y, out);
-            }
-            fn combine(terms: &[(Self, &[Self])], differences: &[(Self, &[Self])], y: &[Self], out: &mut [Self]) {
-                vector::combine(terms, differences, y, out);
-            }
-            fn products<const N: usize>(x: [&[Self]; N], y: &[Self]) -> [Self; N] {
-                vector::products(x, y)
-            }
-            fn add_all<const N: usize>(c: [Self; N], x: [&[Self]; N], out: &mut [Self]) {
-                vector::add_all(c, x, out);
-            }
-            fn recover(weights: [Self; 3], d: &[Self], motion: [&mut [Self]; 3], a: Accumulate) -> bool {
-                vector::recover(weights, d, motion, a)
-            }
-            fn all_finite(x: &[Self]) -> bool {
-                vector::all_finite(x)
-            }
-            fn largest(x: &[Self]) -> Self {
-                vector::largest(x)
-            }
-            fn product(c: Self, a: SparseColMatRef<'_, usize, Self>, x: &[Self], y: &mut [Self]) {
-                product::product(c, a, x, y);
-            }
-            fn symmetric_product(
-                c: Self,
-                a: SparseColMatRef<'_, usize, Self>,
-                x: &[Self],
-                y: &mut [Self],
-                put: Accumulate,
-            ) {
-                product::symmetric_product(c, a, x, y, put);
-            }
-            fn tridiagonal_product(c: Self, a: Tridiagonal<'_, Self>, x: &[Self], y: &mut [Self], put: Accumulate) {
-                product::tridiagonal_product(c, a, x, y, put);
-            }
-            fn lower_product(c: Self, columns: LowerColumns<'_, Self>, x: &[Self], y: &mut [Self]) {
-                product::lower_product(c, columns, x, y);
-            }
-            fn simplicial_cholesky(
-                symbolic: &SymbolicCholesky<usize>,
-                a: SparseColMatRef<'_, usize, Self>,
-                values: &mut [Self],
-                pivots: &mut [Self],
-                memory: &mut MemBuffer,
-            ) -> Result<(), usize> {
-                cholesky::simplicial(symbolic, a, values, pivots, memory)
-            }
-            fn supernodal_cholesky(
-                problem: &supernodal::Problem<'_, Self>,
-                values: &mut [Self],
-                pivots: &mut [Self],
-            ) -> Result<(), usize> {
-                supernodal::factorize(problem, values, pivots)
-            }
-            fn supernodal_workspace(dofs: usize) -> Option<supernodal::Workspace<Self>> {
-                supernodal::workspace(dofs)
-            }
-            fn supernodal_solve(
-                factor: &Supernodal<'_, Self>,
-                order: Option<&[usize]>,
-                rhs: &mut [Self],
-                memory: &mut [Self],
-            ) {
-                interleaved_sweep::solve(factor, order, rhs, memory);
-            }
-            fn simplicial_forward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
-                cholesky::simplicial_forward(factor, columns, x);
-            }
-            fn simplicial_backward(factor: &Simplicial<'_, Self>, columns: Range<usize>, x: &mut [Self]) {
-                cholesky::simplicial_backward(factor, columns, x);
-            }
-            fn chains_forward(chains: Chains<'_, Self>) {
-                chain::forward(chains);
-            }
-            fn chains_backward(chains: Chains<'_, Self>, behind: [Self; 2]) {
-                chain::backward(chains, behind);
-            }
-            fn supernodal_forward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
-                block_sweep::forward(factor, columns, x);
-            }
-            fn supernodal_backward(factor: &Supernodal<'_, Self>, columns: Range<usize>, x: Columns<'_, Self>) {
-                block_sweep::backward(factor, columns, x);
-            }
-            fn forest_forward(
-                factor: Supernodal<'_, Self>,
-                forest: &Forest,
-                b: &[Self],
-                order: Option<&[usize]>,
-                w: &mut [Self],
-            ) {
-                sweep::forest_forward(&sweep::Interior { factor, forest }, b, order, w);
-            }
-            fn forest_backward(factor: Supernodal<'_, Self>, forest: &Forest, w: &mut [Self]) {
-                sweep::forest_backward(&sweep::Interior { factor, forest }, w);
-            }
-            fn dense_cholesky(size: usize, values: &mut [Self], memory: &mut MemBuffer) -> bool {
-                cholesky::dense(size, values, memory)
-            }
-            fn dense_cholesky_scratch(size: usize) -> StackReq {
-                cholesky::dense_scratch::<$scalar>(size)
-            }
-            fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]) {
-                cholesky::dense_solve(size, values, x);
-            }
-            fn scale_blocks(
-                size: usize,
-                pattern: (&[usize], &[u32]),
-                values: &mut [Self],
-                diagonal: &mut [Self],
-            ) -> Result<(), usize> {
-                match size {
-                    3 => conjugate_gradients::scale::<$scalar, 3>(pattern, values, diagonal),
-                    2 => conjugate_gradients::scale::<$scalar, 2>(pattern, values, diagonal),
-                    _ => conjugate_gradients::scale::<$scalar, 1>(pattern, values, diagonal),
-                }
-            }
-            fn incomplete_cholesky(
-                size: usize,
-                lower: &Blocks<'_, Self>,
-                shift: Self,
-                values: &mut [Self],
-                inverses: &mut [Self],
-            ) -> bool {
-                match size {
-                    3 => conjugate_gradients::factorize::<$scalar, 3>(lower, shift, values, inverses),
-                    2 => conjugate_gradients::factorize::<$scalar, 2>(lower, shift, values, inverses),
-                    _ => conjugate_gradients::factorize::<$scalar, 1>(lower, shift, values, inverses),
-                }
-            }
-            fn conjugate_gradients(
-                size: usize,
-                iteration: &Iteration<'_, Self>,
-                b: &mut [Self],
-                vectors: Vectors<'_, Self>,
-            ) -> Outcome {
-                match size {
-                    3 => conjugate_gradients::solve::<$scalar, 3>(iteration, b, vectors),
-                    2 => conjugate_gradients::solve::<$scalar, 2>(iteration, b, vectors),
-                    _ => conjugate_gradients::solve::<$scalar, 1>(iteration, b, vectors),
-                }
-            }
-            fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq {
-                cholesky::scratch::<$scalar>(symbolic)
-            }
-            fn conjugate_gradients_side_by_side(
-                lower: &Blocks<'_, Self>,
-                ends: (f64, usize),
-                vectors: SideVectors<'_, Self>,
-            ) -> [Outcome; LANES] {
-                side_by_side::solve(lower, ends, vectors)
-            }
-            fn lu(
-                symbolic: &SymbolicLu<usize>,
-                a: SparseColMatRef<'_, usize, Self>,
-                numeric: &mut NumericLu<usize, Self>,
-                memory: &mut MemBuffer,
-            ) -> Result<(), LuError> {
-                lu::factorize(symbolic, a, numeric, memory)
-            }
-            fn lu_solve(
-                factor: (&SymbolicLu<usize>, &NumericLu<usize, Self>),
-                side: Side,
-                rhs: &mut [Self],
-                columns: usize,
-                memory: &mut MemBuffer,
-            ) {
-                lu::solve(factor, side, rhs, columns, memory);
-            }
-            fn lu_scratch(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq {
-                lu::scratch::<$scalar>(symbolic, columns)
-            }
-        }
-
-        impl Real for $scalar {
+macro_rules! real {
+    ($($scalar:ty),*) => {
+        $(impl Real for $scalar {
             #[inline]
             fn of(x: f64) -> Self {
                 Scalar::of(x)
@@ -365,9 +192,8 @@ macro_rules! kernels {
             fn value(self) -> f64 {
                 Scalar::value(self)
             }
-        }
+        })*
     };
 }
 
-kernels!(f64);
-kernels!(f32);
+real!(f64, f32);

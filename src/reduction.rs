@@ -14,13 +14,14 @@ mod body;
 mod builder;
 mod exact_step;
 mod lanczos;
+mod matrices;
 mod modes;
 mod pencil;
 mod propagation;
 mod residual;
 
 pub use blocks::Blocks;
-pub use body::ReducedBody;
-pub use builder::{Accuracy, Boundary, Reduction};
+pub use body::{Accuracy, Boundary, ReducedBody};
+pub use builder::Reduction;
 pub use modes::{GivenModes, Modes};
 pub use propagation::{ModalPropagation, ModalPropagationBuilder};

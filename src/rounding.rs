@@ -3,49 +3,86 @@
 //! A tolerance is a share of the magnitudes from which a value is computed, so that results do not depend on units.
 //! ε is the rounding of the scalar. The sections follow the modules that use them.
 
-use crate::real::Real;
+use num_traits::Float;
+
+/// A number in the scalar of the run.
+fn number<T: Float>(x: f64) -> T {
+    T::from(x).unwrap_or_else(T::nan)
+}
 
 // Sums, in every module.
 
 /// What rounding may add to a sum whose terms have this magnitude: 64 ε of it. In the unit of the sum.
-pub(crate) fn rounding<T: Real>(magnitude: T) -> T {
-    T::of(64.0) * T::epsilon() * magnitude
+pub(crate) fn rounding<T: Float>(magnitude: T) -> T {
+    number::<T>(64.0) * T::epsilon() * magnitude
 }
 
 /// The share ε^⅔ of a velocity below which its last bits decide whether bodies that touch without force open or close;
 /// of the diagonal, below which a pivot may be rounding multiplied by the condition of the earlier ones.
-pub(crate) fn share_of_rounding<T: Real>() -> T {
-    T::of(T::epsilon().value().powf(2.0 / 3.0))
+pub(crate) fn share_of_rounding<T: Float>() -> T {
+    T::epsilon().powf(number(2.0 / 3.0))
 }
 
-/// Half of the digits: √ε.
-pub(crate) fn half_digits<T: Real>() -> T {
+/// √ε, half of the digits: values that agree to this share agree as far as solves with a matrix of unknown condition
+/// can tell.
+pub(crate) fn half_digits<T: Float>() -> T {
     T::epsilon().sqrt()
+}
+
+// Linear solvers, mass and reduction.
+
+/// 1e-3 ε, a share of the largest entry: updates and entries below it have no effect, also in a body a million times
+/// as heavy as the one in contact with it, whose response is smaller than its own rounding.
+pub(crate) fn far_below_rounding<T: Float>() -> T {
+    number::<T>(1e-3) * T::epsilon()
+}
+
+/// A share of the length of a vector, of the coefficients of a scheme, or of a time, below which only rounding remains
+/// after subtractions.
+pub(crate) const ONLY_ROUNDING: f64 = 1e-12;
+
+/// The allowed residual of computed modes in the norm of M, relative to a mode: far above rounding, below any error of
+/// a mesh.
+pub(crate) const MODE_RESIDUAL: f64 = 1e-9;
+
+/// The relative difference from which eigenvalues count as distinct: double ones split by the root of rounding.
+pub(crate) const DISTINCT: f64 = 1e-5;
+
+// Analysis of schemes.
+
+/// ε of the result of one operation.
+pub(crate) fn of_operation(x: f64) -> f64 {
+    f64::EPSILON * x.abs()
+}
+
+/// How far rounding splits a root of this multiplicity, relative to the largest entry of the matrix.
+pub(crate) fn split_of_root(multiplicity: usize) -> f64 {
+    f64::EPSILON.powf(1.0 / multiplicity as f64)
 }
 
 // Contact solvers.
 
 /// The share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ: the rounding of 64 terms.
-pub(crate) fn asymmetry<T: Real>() -> T {
-    rounding(T::of(64.0))
+pub(crate) fn asymmetry<T: Float>() -> T {
+    rounding(number(64.0))
 }
 
 /// The share ε^⅖ of its motion without contact by which a gap may be violated by rounding, however large the forces of
 /// badly conditioned rows are.
-pub(crate) fn conditioned_share<T: Real>() -> T {
-    T::of(T::epsilon().value().powf(0.4))
+pub(crate) fn conditioned_share<T: Float>() -> T {
+    T::epsilon().powf(number(0.4))
 }
 
 /// Gaps below this have lost their digits, as of motions that have died out: they need no solve. A length.
-pub(crate) fn smallest_gap<T: Real>() -> T {
+pub(crate) fn smallest_gap<T: Float>() -> T {
     T::min_positive_value() / T::epsilon()
 }
 
 // Contact.
 
 /// The gap below which a contact touches: 1e-10 of the displacement in the step, plus its rounding. A length.
-pub(crate) fn touching<T: Real>(way: T) -> T {
-    T::of(1e-10) * way + rounding(way)
+pub(crate) fn touching<T: Float>(way: T) -> T {
+    number::<T>(1e-10) * way + rounding(way)
 }
 
 // Stages.
@@ -77,7 +114,7 @@ pub(crate) const SMALL_INCREMENT: f64 = 1e4;
 
 /// The largest compliance of a contact, over the diagonal entry of W: ε⁻⁴. The force of a softer contact is lost to
 /// rounding.
-pub(crate) fn largest_compliance<T: Real>() -> T {
+pub(crate) fn largest_compliance<T: Float>() -> T {
     let square = T::epsilon() * T::epsilon();
     (square * square).recip()
 }

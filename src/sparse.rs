@@ -1,4 +1,4 @@
-//! Checks of sparse input, and linear combinations of sparse matrices in one fixed pattern.
+//! Checks of vectors and sparse matrices, and linear combinations of sparse matrices in one fixed pattern.
 
 mod product;
 
@@ -7,6 +7,7 @@ pub(crate) use product::Product;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::rounding;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 
 /// The size of a square matrix.
@@ -15,6 +16,17 @@ pub(crate) fn square<T>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) 
         Ok(a.nrows())
     } else {
         Err(Error::Dimension { what: matrix, expected: a.nrows(), found: a.ncols() })
+    }
+}
+
+/// Rejects a vector of another length than `dofs`, and NaN or infinity in it.
+pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
+    if values.len() != dofs {
+        return Err(Error::Dimension { what, expected: dofs, found: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
+        None => Ok(()),
     }
 }
 
@@ -67,6 +79,13 @@ pub(crate) fn symmetry<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usi
     }
 }
 
+/// Rejects NaN and infinity in a matrix with a [checked](check_pattern) pattern.
+pub(crate) fn check_finite<T: Real>(matrix: &'static str, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    let Some(at) = a.val().iter().position(|value| !value.is_finite()) else { return Ok(()) };
+    let column = a.col_ptr().partition_point(|&start| start <= at) - 1;
+    Err(Error::MatrixNotFinite { matrix, row: a.row_idx()[at], column, value: a.val()[at].value() })
+}
+
 /// As [`check_symmetric`], with memory kept between checks.
 pub(crate) fn check_symmetric_in<T: Real>(
     matrix: &'static str,
@@ -75,18 +94,9 @@ pub(crate) fn check_symmetric_in<T: Real>(
 ) -> Result<()> {
     let n = square(matrix, a)?;
     check_pattern(matrix, a.symbolic())?;
-    let mut largest = T::zero();
-    for column in 0..n {
-        for (&row, &value) in a.row_idx_of_col_raw(column).iter().zip(a.val_of_col(column)) {
-            if !value.is_finite() {
-                return Err(Error::MatrixNotFinite { matrix, row, column, value: value.value() });
-            }
-            largest = largest.max(value.abs());
-        }
-    }
-    // Assembly adds the same element entries in different orders: tolerate a few units in the last place of the
-    // largest entry.
-    let tolerance = T::of(256.0) * T::epsilon() * largest;
+    check_finite(matrix, a)?;
+    // Assembly adds the same element entries in different orders.
+    let tolerance = rounding(T::largest(a.val()));
     let mut worst = (tolerance, None);
     let mut compare = |row: usize, column: usize, value: T, mirrored: T| {
         let difference = (value - mirrored).abs();
@@ -94,35 +104,19 @@ pub(crate) fn check_symmetric_in<T: Real>(
             worst = (difference, Some((row, column, value, mirrored)));
         }
     };
-    // Entries below the diagonal match those of the upper triangle in ascending order: one cursor per column finds
-    // the partners.
+    // The mirror images of the entries of a column, which ascend, are met in ascending order: one cursor for each
+    // column finds them.
     let (pointers, rows, values) = (a.col_ptr(), a.row_idx(), a.val());
     cursor.clear();
     cursor.extend_from_slice(&pointers[..n]);
     for column in 0..n {
         for at in pointers[column]..pointers[column + 1] {
-            let (row, value) = (rows[at], values[at]);
-            if row <= column {
-                continue;
+            let (row, mirror) = (rows[at], &mut cursor[rows[at]]);
+            while *mirror < pointers[row + 1] && rows[*mirror] < column {
+                *mirror += 1;
             }
-            let upper = &mut cursor[row];
-            while *upper < pointers[row + 1] && rows[*upper] < column {
-                compare(rows[*upper], row, values[*upper], T::zero());
-                *upper += 1;
-            }
-            if *upper < pointers[row + 1] && rows[*upper] == column {
-                compare(row, column, value, values[*upper]);
-                *upper += 1;
-            } else {
-                compare(row, column, value, T::zero());
-            }
-        }
-    }
-    for (column, &start) in cursor.iter().enumerate() {
-        for at in start..pointers[column + 1] {
-            if rows[at] < column {
-                compare(rows[at], column, values[at], T::zero());
-            }
+            let is_stored = *mirror < pointers[row + 1] && rows[*mirror] == column;
+            compare(row, column, values[at], if is_stored { values[*mirror] } else { T::zero() });
         }
     }
     match worst.1 {

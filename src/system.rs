@@ -6,6 +6,8 @@ mod linear;
 pub use forces::{DampingForce, Path, PathForce, TangentWeights};
 pub use linear::LinearSystem;
 
+pub(crate) use crate::sparse::check_vector;
+
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::ranks::Ranks;
@@ -216,17 +218,6 @@ pub(crate) fn check_sizes<T: Real>(system: &dyn System<T>) -> Result<usize> {
     size("the pattern of the tangent", system.pattern().ncols())?;
     sparse::check_pattern("tangent", system.pattern())?;
     Ok(dofs)
-}
-
-/// Rejects a vector of another length than `dofs`, and NaN or infinity in it.
-pub(crate) fn check_vector<T: Real>(what: &'static str, values: &[T], dofs: usize) -> Result<()> {
-    if values.len() != dofs {
-        return Err(Error::Dimension { what, expected: dofs, found: values.len() });
-    }
-    match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
-        None => Ok(()),
-    }
 }
 
 /// Pointers to systems are systems: `&mut S` lends the host's model, `Box<dyn System<T>>` allows a choice at run

@@ -22,6 +22,7 @@ pub use row::{A, MAX_PAST, Row, Rows, U, V, Z};
 pub use stage::{ContactLevel, Stage, StageForce};
 
 use crate::error::{Error, Result};
+use crate::rounding::rounding;
 
 /// How the past states of a multistep scheme are initialized.
 ///
@@ -96,7 +97,7 @@ impl Tableau {
         }
         match self.stages.last() {
             None => refuse(0, "there is no stage"),
-            Some(last) if (last.end - 1.0).abs() > f64::EPSILON => {
+            Some(last) if (last.end - 1.0).abs() > rounding(1.0) => {
                 refuse(self.stages.len() - 1, "the last stage must end at the end of the step")
             }
             Some(_) => Ok(()),

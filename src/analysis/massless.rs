@@ -1,5 +1,6 @@
 //! The stability of degrees of freedom without mass.
 
+use crate::rounding::ONLY_ROUNDING;
 use crate::tableau::Tableau;
 
 /// The factor by which an error in the displacement of a dof without mass grows in a step: its balance is algebraic,
@@ -15,8 +16,8 @@ use crate::tableau::Tableau;
 /// use contact_dynamics::{CentralDifference, GeneralizedAlpha, MoreauJean, Newmark, TimeIntegrator, analysis};
 /// assert_eq!(analysis::massless_factor(&Newmark::trapezoidal().tableau()), Some(0.0));
 /// let factor = analysis::massless_factor(&GeneralizedAlpha::chung_hulbert(0.8)?.tableau()).unwrap();
-/// assert!((factor + 0.8).abs() < 1e-12);
-/// assert!((analysis::massless_factor(&MoreauJean::new(0.5)?.tableau()).unwrap() + 1.0).abs() < 1e-12);
+/// assert!((factor + 0.8).abs() < ONLY_ROUNDING);
+/// assert!((analysis::massless_factor(&MoreauJean::new(0.5)?.tableau()).unwrap() + 1.0).abs() < ONLY_ROUNDING);
 /// assert_eq!(analysis::massless_factor(&CentralDifference.tableau()), None);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
@@ -29,8 +30,8 @@ pub fn massless_factor(tableau: &Tableau) -> Option<f64> {
         }
         let rest = balance - share * displacement;
         let others = rest.v.iter().chain(&rest.a).chain(&rest.u[1..]);
-        let alone = others.into_iter().all(|c| c.abs() < 1e-12);
-        alone.then_some(-rest.u[0] / share).map(|factor| if factor.abs() < 1e-12 { 0.0 } else { factor })
+        let alone = others.into_iter().all(|c| c.abs() < ONLY_ROUNDING);
+        alone.then_some(-rest.u[0] / share).map(|factor| if factor.abs() < ONLY_ROUNDING { 0.0 } else { factor })
     };
     tableau.stages.iter().map(factor).try_fold(1.0, |product, factor| Some(product * factor?))
 }
@@ -39,7 +40,9 @@ pub fn massless_factor(tableau: &Tableau) -> Option<f64> {
 /// displacements: dofs without mass can then be brought into static balance before the rest of the stage is solved.
 pub(crate) fn massless_follow(tableau: &Tableau) -> bool {
     tableau.stages.iter().all(|stage| {
-        stage.recovery.u.z == 0.0 && stage.balance.u == stage.recovery.u && (stage.load - stage.end).abs() < 1e-12
+        stage.recovery.u.z == 0.0
+            && stage.balance.u == stage.recovery.u
+            && (stage.load - stage.end).abs() < ONLY_ROUNDING
     })
 }
 
@@ -53,9 +56,9 @@ pub(crate) fn steps_by_means(tableau: &Tableau) -> bool {
     let unit = |i: usize| (0..size).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Values>();
     let mut states: Vec<[Values; 3]> = vec![[unit(0), unit(1), unit(2)]];
     let (mut multiple, mut before): (Option<f64>, f64) = (None, 0.0);
-    let is_small = |x: &f64| x.abs() < 1e-12;
+    let is_small = |x: &f64| x.abs() < ONLY_ROUNDING;
     for (s, stage) in tableau.stages.iter().enumerate() {
-        if stage.balance != stage.recovery || (stage.load - stage.end).abs() > 1e-12 {
+        if stage.balance != stage.recovery || (stage.load - stage.end).abs() > ONLY_ROUNDING {
             return false;
         }
         let mut new = [const { Values::new() }; 3];

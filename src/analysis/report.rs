@@ -5,6 +5,7 @@ use super::{
     spectral_radius, zero_stability,
 };
 use crate::error::Result;
+use crate::rounding::{ONLY_ROUNDING, half_digits};
 use crate::tableau::{ContactLevel, StartUp, Tableau};
 use std::fmt;
 
@@ -59,7 +60,7 @@ pub fn report(tableau: &Tableau) -> Result<Report> {
     let radius_at_infinity = radius_at_infinity(tableau);
     let critical_omega = critical_omega(tableau, 0.0);
     let range = critical_omega.unwrap_or(100.0);
-    let keeps = |fraction: f64| (spectral_radius(tableau, fraction * range, 0.0) - 1.0).abs() < 1e-9;
+    let keeps = |fraction: f64| (spectral_radius(tableau, fraction * range, 0.0) - 1.0).abs() < half_digits();
     let read = tableau.read_after(tableau.stages.len().saturating_sub(1))?;
     let contact = tableau.stages.last().map(|stage| stage.contact);
     let multipliers = tableau.stages.iter().all(|stage| stage.contact_row().z != 0.0);
@@ -87,7 +88,7 @@ impl Report {
             coefficients.iter().copied().zip(quantities)
         });
         let mut words = String::new();
-        for (c, quantity) in terms.filter(|(c, _)| c.abs() > 1e-12) {
+        for (c, quantity) in terms.filter(|(c, _)| c.abs() > ONLY_ROUNDING) {
             words += match (words.is_empty(), c < 0.0) {
                 (true, false) => "",
                 (true, true) => "−",
@@ -96,7 +97,7 @@ impl Report {
             };
             // At most four digits, none for 1.
             let factor = (c.abs() * 1e4).round() / 1e4;
-            if (factor - 1.0).abs() > 1e-12 {
+            if (factor - 1.0).abs() > ONLY_ROUNDING {
                 words += &factor.to_string();
                 words.push(' ');
             }

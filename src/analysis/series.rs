@@ -1,5 +1,7 @@
 //! Truncated Laurent series in the step size, with running error bounds that identify cancelling terms as zero.
 
+use crate::rounding::of_operation;
+
 /// `h^valuation (c₀ + c₁ h + c₂ h² + …)`; terms beyond the stored ones are unknown, an empty series is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Series {
@@ -29,7 +31,7 @@ impl Series {
     pub(super) fn exponential(rate: f64) -> Self {
         let mut c = 1.0;
         let terms = (1..=TERMS).map(|n| {
-            let term = (c, 4.0 * f64::EPSILON * f64::abs(c));
+            let term = (c, 4.0 * of_operation(c));
             c *= rate / n as f64;
             term
         });
@@ -73,17 +75,17 @@ impl Series {
             for (i, &(r, e)) in terms.iter().enumerate() {
                 let (c, own) = self.terms[n - i];
                 sum -= c * r;
-                bound += (c * e).abs() + (own * r).abs() + f64::EPSILON * (c * r).abs();
+                bound += (c * e).abs() + (own * r).abs() + of_operation(c * r);
             }
             let value = sum / first;
-            terms.push((value, (bound + (value * error).abs()) / first.abs() + f64::EPSILON * value.abs()));
+            terms.push((value, (bound + (value * error).abs()) / first.abs() + of_operation(value)));
         }
         Self { valuation: -self.valuation, terms }
     }
 
     /// `c h^power self`.
     pub(super) fn scaled(&self, c: f64, power: i32) -> Self {
-        let scale = |&(x, e): &(f64, f64)| (c * x, (c * e).abs() + f64::EPSILON * (c * x).abs());
+        let scale = |&(x, e): &(f64, f64)| (c * x, (c * e).abs() + of_operation(c * x));
         Self { valuation: self.valuation + power, terms: self.terms.iter().map(scale).collect() }.normalized()
     }
 
@@ -108,7 +110,7 @@ impl Series {
         let terms = (0..known).map(|n| {
             (0..=n).fold((0.0, 0.0), |(sum, bound), i| {
                 let ((x, e), (y, f)) = (self.terms[i], other.terms[n - i]);
-                (sum + x * y, bound + (x * f).abs() + (y * e).abs() + f64::EPSILON * (x * y).abs())
+                (sum + x * y, bound + (x * f).abs() + (y * e).abs() + of_operation(x * y))
             })
         });
         Self { valuation: self.valuation + other.valuation, terms: terms.collect() }.normalized()
@@ -129,7 +131,7 @@ impl Series {
         };
         let terms = (valuation..end(self).min(end(other))).map(|power| {
             let ((x, e), (y, f)) = (term(self, power), term(other, power));
-            (x + sign * y, e + f + f64::EPSILON * (x.abs() + y.abs()))
+            (x + sign * y, e + f + of_operation(x.abs() + y.abs()))
         });
         Self { valuation, terms: terms.collect() }.normalized()
     }

@@ -1,6 +1,7 @@
 //! Stability: the limit of high frequencies, the critical frequency, and zero-stability.
 
 use super::{largest_modulus, matrix, moduli, roots};
+use crate::rounding::{DISTINCT, ONLY_ROUNDING, split_of_root};
 use crate::tableau::Tableau;
 use faer::{Mat, c64};
 
@@ -34,7 +35,7 @@ pub fn radius_at_infinity(tableau: &Tableau) -> Option<f64> {
     };
     let is_split = |m: &usize| {
         let spread = roots[..*m].iter().map(|root| modulus(*root - mean(*m))).fold(0.0, f64::max);
-        spread <= 4.0 * limit.norm_max() * f64::EPSILON.powf(1.0 / *m as f64)
+        spread <= 4.0 * limit.norm_max() * split_of_root(*m)
     };
     let multiplicity = (2..=roots.len()).rev().find(is_split).unwrap_or(1);
     Some(modulus(mean(multiplicity)))
@@ -49,7 +50,7 @@ fn is_nilpotent(a: &Mat<f64>) -> bool {
     let n = a.nrows();
     let power = (1..n).fold(a.clone(), |power, _| &power * a);
     let scale = a.norm_max().max(1.0) * n as f64;
-    power.norm_max() <= 1e-13 * scale.powi(i32::try_from(n).unwrap_or(i32::MAX))
+    power.norm_max() <= ONLY_ROUNDING * scale.powi(i32::try_from(n).unwrap_or(i32::MAX))
 }
 
 /// Ω up to which the scheme is stable at damping ratio ξ: below it the spectral radius is at most 1. `None` if this
@@ -77,7 +78,7 @@ fn critical_along(tableau: &Tableau, omega: f64, damping: f64) -> Option<f64> {
     // Roots that are nearly double at 1 have an accuracy of eps/x, matrices of size x one of eps x. NaN counts as
     // unstable.
     let radius = |x: f64| largest_modulus(&roots(tableau, x * omega, x * damping));
-    let is_stable = |x: f64| radius(x) <= 1.0 + 1e-11 + 1e-13 * x;
+    let is_stable = |x: f64| radius(x) <= 1.0 + ONLY_ROUNDING * (10.0 + x);
     let at = |i: i32| 10_f64.powf(f64::from(i) / 80.0);
     let first = (-160..=320).find(|&i| !is_stable(at(i)))?;
     if first == -160 {
@@ -115,18 +116,19 @@ pub enum ZeroStability {
 /// assert_eq!(zero_stability(&Park.tableau()), ZeroStability::Strong);
 /// ```
 pub fn zero_stability(tableau: &Tableau) -> ZeroStability {
-    // Double roots split by about the square root of the rounding error.
-    const SPLIT: f64 = 1e-5;
     let roots = matrix(&tableau.step_map([0.0, 0.0, 1.0])).eigenvalues().unwrap_or_default();
     let one = c64::new(1.0, 0.0);
-    let rigid = roots.iter().filter(|root| modulus(**root - one) < SPLIT).count();
+    let rigid = roots.iter().filter(|root| modulus(**root - one) < DISTINCT).count();
     let largest = moduli(&roots).fold(0.0, |largest: f64, x| if x.is_nan() { x } else { largest.max(x) });
-    if rigid != 2 || largest.is_nan() || largest > 1.0 + SPLIT {
+    if rigid != 2 || largest.is_nan() || largest > 1.0 + DISTINCT {
         return ZeroStability::Unstable;
     }
-    let marginal: Vec<c64> =
-        roots.iter().copied().filter(|root| modulus(*root) > 1.0 - SPLIT && modulus(*root - one) >= SPLIT).collect();
-    let simple = |i: usize| (0..i).all(|j| modulus(marginal[i] - marginal[j]) > SPLIT);
+    let marginal: Vec<c64> = roots
+        .iter()
+        .copied()
+        .filter(|root| modulus(*root) > 1.0 - DISTINCT && modulus(*root - one) >= DISTINCT)
+        .collect();
+    let simple = |i: usize| (0..i).all(|j| modulus(marginal[i] - marginal[j]) > DISTINCT);
     match (marginal.is_empty(), (0..marginal.len()).all(simple)) {
         (true, _) => ZeroStability::Strong,
         (false, true) => ZeroStability::Weak,

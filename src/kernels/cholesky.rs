@@ -12,15 +12,6 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::{MatMut, MatRef, Par, Side, Spec};
 use std::ops::Range;
 
-/// How a factor of a symmetric matrix is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Factorization {
-    /// L D Lᵀ, simplicial.
-    Ldlt,
-    /// L Lᵀ, supernodal.
-    Llt,
-}
-
 /// A simplicial L D Lᵀ in the order of elimination: each column holds 1/D, then L below it.
 #[derive(Clone, Copy, Debug)]
 pub struct Simplicial<'a, T> {
@@ -38,13 +29,13 @@ pub struct Supernodal<'a, T> {
     pub values: &'a [T],
 }
 
-/// Right-hand sides of a supernodal sweep, in the order of elimination.
+/// The right-hand side of a supernodal sweep, in the order of elimination.
 #[derive(Debug)]
-pub struct Columns<'a, T> {
-    /// The columns one after the other, each without its first `skipped` entries.
+pub struct RightHandSide<'a, T> {
+    /// Without its first `skipped` entries.
     pub values: &'a mut [T],
     pub skipped: usize,
-    /// Memory for the rows below any supernode, once per column.
+    /// Memory for the rows of any supernode.
     pub scratch: &'a mut [T],
 }
 

@@ -1,6 +1,14 @@
-//! Preconditioned conjugate gradients on a matrix in blocks, scaled so that its diagonal blocks are identities.
+//! Conjugate gradients, preconditioned by Gauss–Seidel sweeps, on a matrix in blocks that is scaled so that its
+//! diagonal blocks are identities.
+//!
+//! Several right-hand sides are solved together: each row of a sweep waits for earlier ones, and the other right-hand
+//! sides use that time. The result for one right-hand side does not depend on the others or on the machine: no product
+//! is fused with its sum.
+#![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
+use crate::rounding::rounding;
 use crate::scalar::Scalar;
+use faer::traits::pulp::{Arch, Simd, WithSimd};
 
 /// Blocks below the diagonal of a symmetric matrix, row by row, each stored column by column.
 #[derive(Clone, Copy, Debug)]
@@ -10,24 +18,12 @@ pub struct Blocks<'a, T> {
     pub values: &'a [T],
 }
 
-/// Preconditioners of conjugate gradients for a matrix with identities as diagonal blocks.
-#[derive(Clone, Copy, Debug)]
-pub enum Sweeps<'a, T> {
-    /// None beyond the scaling of the matrix.
-    Nodes,
-    /// (1 + L)(1 + Lᵀ).
-    GaussSeidel,
-    /// An incomplete factor, with the inverses of its diagonal blocks.
-    Incomplete { factor: Blocks<'a, T>, inverses: &'a [T] },
-}
-
-/// Conjugate gradients for a scaled matrix.
+/// A scaled matrix, and when an iteration ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Iteration<'a, T> {
     pub lower: Blocks<'a, T>,
     /// C⁻¹ of each diagonal block C Cᵀ of the matrix.
     pub scaling: &'a [T],
-    pub sweeps: Sweeps<'a, T>,
     /// Tolerance of the preconditioned residual, relative to the right-hand side.
     pub tolerance: f64,
     /// An update smaller than this share of the solution ends the iteration.
@@ -35,14 +31,29 @@ pub struct Iteration<'a, T> {
     pub limit: usize,
 }
 
-/// Memory of conjugate gradients.
+/// One entry of each of W right-hand sides.
+pub(crate) type Lanes<T, const W: usize> = [T; W];
+
+/// Number of right-hand sides that are solved together.
+pub(crate) const LANES: usize = 4;
+
+/// Vectors of conjugate gradients: the solution, the right-hand side, which is overwritten, and three work vectors.
 #[derive(Debug)]
-pub struct Vectors<'a, T> {
-    pub x: &'a mut [T],
-    pub r: &'a mut [T],
-    pub p: &'a mut [T],
-    pub t: &'a mut [T],
-    pub q: &'a mut [T],
+pub struct Vectors<'a, T, const W: usize> {
+    pub x: &'a mut [Lanes<T, W>],
+    pub r: &'a mut [Lanes<T, W>],
+    pub p: &'a mut [Lanes<T, W>],
+    pub t: &'a mut [Lanes<T, W>],
+    pub y: &'a mut [Lanes<T, W>],
+}
+
+impl<'a, T, const W: usize> Vectors<'a, T, W> {
+    /// Vectors of `size` entries each in memory for five of them.
+    pub(crate) fn of(memory: &'a mut [T], size: usize) -> Self {
+        let mut parts = memory.as_chunks_mut().0.chunks_exact_mut(size.max(1));
+        let mut next = || parts.next().map_or(&mut [][..], |part| &mut part[..size]);
+        Self { x: next(), r: next(), p: next(), t: next(), y: next() }
+    }
 }
 
 /// Result of conjugate gradients.
@@ -55,32 +66,18 @@ pub enum Outcome {
         iterations: usize,
         residual: f64,
     },
-    /// `curvature` is pᵀAp over pᵀdiag(A)p for a direction p, `dof` the one with the smallest share of pᵀAp.
+    /// `curvature` is pᵀAp over pᵀdiag(A)p for a direction p, `dof` its largest entry.
     Indefinite {
         curvature: f64,
         dof: usize,
     },
 }
 
-/// Partial sums: in a single sum each addition would wait for the one before.
-const LANES: usize = 4;
-
-/// Σ x y in double precision: in an f32 run products of long vectors would otherwise lose digits or overflow.
-#[inline]
-fn dot<T: Scalar>(x: &[T], y: &[T]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let (x_rest, y_rest) = (x.chunks_exact(LANES).remainder(), y.chunks_exact(LANES).remainder());
-    for (x, y) in x.chunks_exact(LANES).zip(y.chunks_exact(LANES)) {
-        for k in 0..LANES {
-            sums[k] += x[k].value() * y[k].value();
-        }
-    }
-    let rest: f64 = x_rest.iter().zip(y_rest).map(|(x, y)| x.value() * y.value()).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
 /// A block, `[column][row]`.
 type Block<T, const B: usize> = [[T; B]; B];
+
+/// The entries of a row of blocks, for each right-hand side.
+type Row<T, const B: usize, const W: usize> = [Lanes<T, W>; B];
 
 #[inline]
 fn block<T: Scalar, const B: usize>(values: &[T]) -> Block<T, B> {
@@ -107,7 +104,7 @@ fn inverse_factor<T: Scalar, const B: usize>(a: &Block<T, B>) -> Result<Block<T,
             }
             l[c][r] = if r > c {
                 sum / l[c][c]
-            } else if sum > T::of(16.0) * T::epsilon() * a[c][c] && sum.is_finite() {
+            } else if sum > rounding(a[c][c]) && sum.is_finite() {
                 sum.sqrt()
             } else {
                 return Err(c);
@@ -140,102 +137,39 @@ fn lower_transposed<T: Scalar, const B: usize>(l: &[T], x: [T; B]) -> [T; B] {
     std::array::from_fn(|c| (c..B).map(|r| l[c * B + r] * x[r]).sum())
 }
 
+/// As [`scale`], in blocks of `size`².
 #[inline]
-fn node<T: Scalar, const B: usize>(x: &[T], node: usize) -> [T; B] {
-    let x = &x[node * B..(node + 1) * B];
-    std::array::from_fn(|k| x[k])
-}
-
-/// Σ_J L_IJ y_J of block row I.
-#[inline]
-fn gather<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, row: usize, y: &[T]) -> [T; B] {
-    let range = lower.pointers[row]..lower.pointers[row + 1];
-    let mut sums = [[T::zero(); B]; B];
-    let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
-    for (&column, block) in lower.columns[range].iter().zip(blocks) {
-        let y: [T; B] = node(y, column as usize);
-        for c in 0..B {
-            for r in 0..B {
-                sums[c][r] += block[c * B + r] * y[c];
-            }
-        }
-    }
-    std::array::from_fn(|r| (0..B).map(|c| sums[c][r]).sum())
-}
-
-/// `y_J += sign L_IJᵀ x` for all J of block row I.
-#[inline]
-fn scatter<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, row: usize, x: [T; B], y: &mut [T]) {
-    let range = lower.pointers[row]..lower.pointers[row + 1];
-    let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
-    for (&column, block) in lower.columns[range].iter().zip(blocks) {
-        let y = &mut y[column as usize * B..][..B];
-        for c in 0..B {
-            let mut sum = T::zero();
-            for r in 0..B {
-                sum += block[c * B + r] * x[r];
-            }
-            y[c] += sum;
-        }
+pub(crate) fn scale_blocks<T: Scalar>(
+    size: usize,
+    pattern: (&[usize], &[u32]),
+    values: &mut [T],
+    diagonal: &mut [T],
+) -> Result<(), usize> {
+    match size {
+        3 => scale::<T, 3>(pattern, values, diagonal),
+        2 => scale::<T, 2>(pattern, values, diagonal),
+        _ => scale::<T, 1>(pattern, values, diagonal),
     }
 }
 
-/// `q = (1 + L + Lᵀ) p`.
+/// As [`solve`], in blocks of `size`².
 #[inline]
-fn product<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, p: &[T], q: &mut [T]) {
-    q.copy_from_slice(p);
-    for row in 0..p.len() / B {
-        let sum: [T; B] = gather(lower, row, p);
-        for (q, sum) in q[row * B..(row + 1) * B].iter_mut().zip(sum) {
-            *q += sum;
-        }
-        scatter::<T, B>(lower, row, node(p, row), q);
-    }
-}
-
-/// `x ← (1 + L)⁻¹ x`.
-#[inline]
-fn forward<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
-    for row in 0..x.len() / B {
-        let sum: [T; B] = gather(lower, row, x);
-        for (x, sum) in x[row * B..(row + 1) * B].iter_mut().zip(sum) {
-            *x -= sum;
-        }
-    }
-}
-
-/// `x ← (1 + Lᵀ)⁻¹ x`.
-#[inline]
-fn backward<T: Scalar, const B: usize>(lower: &Blocks<'_, T>, x: &mut [T]) {
-    for row in (0..x.len() / B).rev() {
-        let own: [T; B] = node(x, row);
-        scatter::<T, B>(lower, row, own.map(|x| -x), x);
-    }
-}
-
-/// `z = (K Kᵀ)⁻¹ r` with an incomplete factor K: blocks below the diagonal, and the inverses of the diagonal blocks.
-#[inline]
-fn incomplete<T: Scalar, const B: usize>(factor: &Blocks<'_, T>, inverses: &[T], r: &[T], z: &mut [T]) {
-    z.copy_from_slice(r);
-    let nodes = r.len() / B;
-    for row in 0..nodes {
-        let (sum, own): ([T; B], [T; B]) = (gather(factor, row, z), node(z, row));
-        let inverse = &inverses[row * B * B..(row + 1) * B * B];
-        let own = lower_product::<T, B>(inverse, std::array::from_fn(|k| own[k] - sum[k]));
-        z[row * B..(row + 1) * B].copy_from_slice(&own);
-    }
-    for row in (0..nodes).rev() {
-        let inverse = &inverses[row * B * B..(row + 1) * B * B];
-        let own = lower_transposed::<T, B>(inverse, node(z, row));
-        z[row * B..(row + 1) * B].copy_from_slice(&own);
-        scatter::<T, B>(factor, row, own.map(|x| -x), z);
+pub(crate) fn solve_blocks<T: Scalar>(
+    size: usize,
+    iteration: &Iteration<'_, T>,
+    vectors: Vectors<'_, T, 1>,
+) -> [Outcome; 1] {
+    match size {
+        3 => solve::<T, 3, 1>(iteration, vectors),
+        2 => solve::<T, 2, 1>(iteration, vectors),
+        _ => solve::<T, 1, 1>(iteration, vectors),
     }
 }
 
 /// Scales a matrix: `values` and `diagonal` hold its blocks and are replaced by C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the
 /// Cholesky factors C_I of the diagonal blocks. `Err` is the dof of a pivot that is not positive.
 #[inline]
-pub(crate) fn scale<T: Scalar, const B: usize>(
+fn scale<T: Scalar, const B: usize>(
     (pointers, columns): (&[usize], &[u32]),
     values: &mut [T],
     diagonal: &mut [T],
@@ -263,85 +197,24 @@ pub(crate) fn scale<T: Scalar, const B: usize>(
     Ok(())
 }
 
-/// Incomplete Cholesky factor, in the pattern, of a scaled matrix with `shift` added to its diagonal; returns whether
-/// all pivots were positive.
-#[inline]
-pub(crate) fn factorize<T: Scalar, const B: usize>(
-    lower: &Blocks<'_, T>,
-    shift: T,
-    values: &mut [T],
-    inverses: &mut [T],
-) -> bool {
-    let Blocks { pointers, columns, .. } = *lower;
-    for row in 0..pointers.len() - 1 {
-        let mut diagonal: Block<T, B> = [[T::zero(); B]; B];
-        for (k, column) in diagonal.iter_mut().enumerate() {
-            column[k] = T::one() + shift;
-        }
-        for at in pointers[row]..pointers[row + 1] {
-            let column = columns[at] as usize;
-            let mut own: Block<T, B> = block(&lower.values[at * B * B..(at + 1) * B * B]);
-            let (mut i, mut j) = (pointers[row], pointers[column]);
-            while i < at && j < pointers[column + 1] {
-                match columns[i].cmp(&columns[j]) {
-                    std::cmp::Ordering::Less => i += 1,
-                    std::cmp::Ordering::Greater => j += 1,
-                    std::cmp::Ordering::Equal => {
-                        let (left, right) = (&values[i * B * B..(i + 1) * B * B], &values[j * B * B..(j + 1) * B * B]);
-                        for c in 0..B {
-                            for r in 0..B {
-                                for k in 0..B {
-                                    own[c][r] -= left[k * B + r] * right[k * B + c];
-                                }
-                            }
-                        }
-                        (i, j) = (i + 1, j + 1);
-                    }
-                }
-            }
-            let inverse = &inverses[column * B * B..(column + 1) * B * B];
-            let rows: Block<T, B> = std::array::from_fn(|r| lower_product(inverse, std::array::from_fn(|c| own[c][r])));
-            own = std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]));
-            for (c, column) in diagonal.iter_mut().enumerate() {
-                for (r, sum) in column.iter_mut().enumerate() {
-                    for own in &own {
-                        *sum -= own[r] * own[c];
-                    }
-                }
-            }
-            store(&own, &mut values[at * B * B..(at + 1) * B * B]);
-        }
-        let Ok(inverse) = inverse_factor::<T, B>(&diagonal) else { return false };
-        store(&inverse, &mut inverses[row * B * B..(row + 1) * B * B]);
-    }
-    true
-}
-
 /// The criteria that end an iteration, tested after each step.
-pub(super) struct Judge {
+#[derive(Clone, Copy)]
+struct Ends {
     tolerance: f64,
+    /// Squared, like lengths.
+    resolution: f64,
+    limit: usize,
     /// The squared norm of the right-hand side.
     first: f64,
     /// Σ α ρ: the squared length of the present solution in the norm of the matrix (Hestenes and Stiefel, 1952,
     /// theorem 6:1: directions are orthogonal in that norm).
-    pub(super) length: f64,
-    /// Squared, like lengths.
-    resolution: f64,
+    length: f64,
     iterations: usize,
-    limit: usize,
 }
 
-impl Judge {
-    pub(super) fn new([tolerance, resolution]: [f64; 2], limit: usize, first: f64) -> Self {
-        Self { tolerance, first, length: 0.0, resolution: resolution * resolution, iterations: 0, limit }
-    }
-
-    fn begin(&mut self, first: f64) {
-        self.first = first;
-    }
-
+impl Ends {
     /// After a step α along a direction, with ρ before and after it.
-    pub(super) fn outcome(&mut self, alpha: f64, before: f64, after: f64) -> Option<Outcome> {
+    fn outcome(&mut self, alpha: f64, before: f64, after: f64) -> Option<Outcome> {
         self.iterations += 1;
         let step = alpha * before;
         self.length += step;
@@ -354,148 +227,228 @@ impl Judge {
     }
 }
 
-/// For a solution x, xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue. Below this many units of rounding
-/// fewer than two of its digits are significant: the matrix is singular to working precision.
-pub(super) const NEGLIGIBLE: f64 = 64.0;
-
-/// Solves A x = b in place, starting from zero.
+/// Solves A x = r for each right-hand side r, starting from zero.
 #[inline]
-pub(crate) fn solve<T: Scalar, const B: usize>(
+pub(crate) fn solve<T: Scalar, const B: usize, const W: usize>(
     iteration: &Iteration<'_, T>,
-    b: &mut [T],
-    vectors: Vectors<'_, T>,
-) -> Outcome {
-    let Iteration { lower, scaling, sweeps, .. } = iteration;
-    let Vectors { x, r, p, t, q } = vectors;
-    let blocks = scaling.chunks_exact(B * B);
-    for ((b, r), inverse) in b.chunks_exact(B).zip(r.chunks_exact_mut(B)).zip(blocks) {
-        r.copy_from_slice(&lower_product::<T, B>(inverse, node(b, 0)));
+    vectors: Vectors<'_, T, W>,
+) -> [Outcome; W] {
+    match W {
+        1 => solve_lanes::<T, B, W>(iteration, vectors),
+        _ => Arch::new().dispatch(Solve::<T, B, W> { iteration, vectors }),
     }
-    let largest = r.iter().fold(T::zero(), |largest, r| if r.abs() <= largest { largest } else { r.abs() });
-    if !largest.is_finite() || r.iter().any(|r| r.is_nan()) {
-        b.fill(T::nan());
-        return Outcome::Converged { iterations: 0 };
+}
+
+struct Solve<'a, T, const B: usize, const W: usize> {
+    iteration: &'a Iteration<'a, T>,
+    vectors: Vectors<'a, T, W>,
+}
+
+impl<T: Scalar, const B: usize, const W: usize> WithSimd for Solve<'_, T, B, W> {
+    type Output = [Outcome; W];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [Outcome; W] {
+        solve_lanes::<T, B, W>(self.iteration, self.vectors)
     }
-    if largest == T::zero() {
-        b.fill(T::zero());
-        return Outcome::Converged { iterations: 0 };
-    }
-    // Scaled by a power of two, without rounding: squares of small forces stay in range.
-    #[allow(clippy::cast_possible_truncation)]
-    let least = T::min_positive_value().value().log2() as i32 + 8;
-    #[allow(clippy::cast_possible_truncation)]
-    let exponent = (largest.value().log2().floor() as i32).max(least);
-    let (down, up) = (T::of(2.0_f64.powi(-exponent)), T::of(2.0_f64.powi(exponent)));
-    for r in r.iter_mut() {
-        *r *= down;
-    }
-    x.fill(T::zero());
-    let mut judge = Judge::new([iteration.tolerance, iteration.resolution], iteration.limit, 0.0);
-    let outcome = match sweeps {
-        Sweeps::GaussSeidel => gauss_seidel::<T, B>(lower, &mut judge, [x, r, p, t, q]),
-        Sweeps::Nodes => preconditioned::<T, B>(lower, &mut judge, [x, r, p, t, q], |r, z| z.copy_from_slice(r)),
-        Sweeps::Incomplete { factor, inverses } => {
-            preconditioned::<T, B>(lower, &mut judge, [x, r, p, t, q], |r, z| {
-                incomplete::<T, B>(factor, inverses, r, z);
-            })
+}
+
+#[inline(always)]
+fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
+    iteration: &Iteration<'_, T>,
+    Vectors { x, r, p, t, y }: Vectors<'_, T, W>,
+) -> [Outcome; W] {
+    let Iteration { lower, scaling, tolerance, resolution, limit } = *iteration;
+    let mut largest = [T::zero(); W];
+    for (r, inverse) in r.as_chunks_mut::<B>().0.iter_mut().zip(scaling.chunks_exact(B * B)) {
+        *r = each_lane(r, |r| lower_product(inverse, r));
+        for r in r {
+            for l in 0..W {
+                largest[l] = if r[l].abs() <= largest[l] || largest[l].is_nan() { largest[l] } else { r[l].abs() };
+            }
         }
-    };
-    // The last direction is in t.
-    let suspect = match outcome {
-        Outcome::Indefinite { .. } => Some(&*t),
-        Outcome::Converged { .. } if judge.length <= NEGLIGIBLE * T::epsilon().value() * dot(x, x) => Some(&*x),
-        _ => None,
-    };
-    if let Some(p) = suspect {
-        // The diagonal is one.
-        product::<T, B>(lower, p, q);
-        let shares = p.iter().zip(q.iter()).map(|(&p, &q)| (p * q).value());
-        let worst = shares.enumerate().fold((0, f64::INFINITY), |w, (i, x)| if x < w.1 { (i, x) } else { w });
-        let curvature = dot(p, q) / dot(p, p);
-        // An overflowing solution indicates a singular matrix.
-        return Outcome::Indefinite { curvature: if curvature.is_nan() { 0.0 } else { curvature }, dof: worst.0 };
     }
-    for ((b, x), inverse) in b.chunks_exact_mut(B).zip(x.chunks_exact(B)).zip(scaling.chunks_exact(B * B)) {
-        b.copy_from_slice(&lower_transposed::<T, B>(inverse, node(x, 0)).map(|x| up * x));
+    // Scaled by a power of two, without rounding: squares of small forces stay in range. Right-hand sides that are
+    // zero or not finite are replaced by zero.
+    let powers = largest.map(powers);
+    for r in r.iter_mut() {
+        for l in 0..W {
+            r[l] = powers[l].map_or(T::zero(), |[down, _]| down * r[l]);
+        }
     }
-    outcome
+    let ends = Ends { tolerance, resolution: resolution * resolution, limit, first: 0.0, length: 0.0, iterations: 0 };
+    let mut ends = [ends; W];
+    let mut outcomes = iterate::<T, B, W>(&lower, &mut ends, [x, r, p, t, y]);
+    let mut lengths = [0.0; W];
+    x.iter().for_each(|x| accumulate(x, x, &mut lengths));
+    for l in 0..W {
+        let Outcome::Converged { iterations: 1.. } = outcomes[l] else { continue };
+        // xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue. Below the rounding of the entries of A the matrix
+        // is singular to working precision; so it is if the solution overflows.
+        let curvature = ends[l].length / lengths[l];
+        if !(curvature > rounding(T::one()).value()) {
+            let curvature = if curvature.is_nan() { 0.0 } else { curvature };
+            outcomes[l] = Outcome::Indefinite { curvature, dof: place_of_largest(x, l) };
+        }
+    }
+    for (x, inverse) in x.as_chunks_mut::<B>().0.iter_mut().zip(scaling.chunks_exact(B * B)) {
+        *x = each_lane(x, |x| lower_transposed(inverse, x));
+        for x in x {
+            // The product is NaN for a right-hand side that is not finite.
+            *x = std::array::from_fn(|l| powers[l].map_or(T::zero() * largest[l], |[_, up]| up * x[l]));
+        }
+    }
+    outcomes
+}
+
+/// Powers of two next to 1/x and x; `None` if x is zero or not finite.
+#[allow(clippy::cast_possible_truncation)]
+fn powers<T: Scalar>(x: T) -> Option<[T; 2]> {
+    let least = T::min_positive_value().value().log2() as i32 + 8;
+    let exponent = (x.value().log2().floor() as i32).max(least);
+    (x > T::zero() && x.is_finite()).then(|| [-exponent, exponent].map(|exponent| T::of(2.0_f64.powi(exponent))))
 }
 
 /// With the preconditioner (1 + L)(1 + Lᵀ), in a form in which a step costs only one product (Eisenstat, 1981): in
 /// the variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
-#[inline]
-fn gauss_seidel<T: Scalar, const B: usize>(
+/// A right-hand side whose iteration has ended waits for the others, with steps of zero.
+#[inline(always)]
+fn iterate<T: Scalar, const B: usize, const W: usize>(
     lower: &Blocks<'_, T>,
-    judge: &mut Judge,
-    [x, r, p, t, y]: [&mut [T]; 5],
-) -> Outcome {
-    forward::<T, B>(lower, r);
-    let mut rho = dot(r, r);
-    judge.begin(rho);
+    ends: &mut [Ends; W],
+    [x, r, p, t, y]: [&mut [Lanes<T, W>]; 5],
+) -> [Outcome; W] {
+    let size = x.len();
+    let (r, p, t, y) = (&mut r[..size], &mut p[..size], &mut t[..size], &mut y[..size]);
+    x.fill([T::zero(); W]);
+    let mut rho = [0.0; W];
+    for row in 0..size / B {
+        let sums = gather::<T, B, W>(lower, row, r);
+        for (r, sum) in r[row * B..][..B].iter_mut().zip(sums) {
+            *r = std::array::from_fn(|l| r[l] - sum[l]);
+            accumulate(r, r, &mut rho);
+        }
+    }
     p.copy_from_slice(r);
-    loop {
+    for l in 0..W {
+        ends[l].first = rho[l];
+    }
+    let mut outcomes = rho.map(|rho| (rho == 0.0).then_some(Outcome::Converged { iterations: 0 }));
+    while outcomes.iter().any(Option::is_none) {
         t.copy_from_slice(p);
-        backward::<T, B>(lower, t);
-        let mut curvature = 0.0;
-        for row in 0..p.len() / B {
-            let sum: [T; B] = gather(lower, row, y);
-            for (k, sum) in (row * B..).zip(sum) {
-                y[k] = p[k] - t[k] - sum;
-                curvature += (p[k] * (t[k] + y[k])).value();
+        for row in (0..size / B).rev() {
+            scatter::<T, B, W>(lower, row, t);
+        }
+        let mut curvature = [0.0; W];
+        for row in 0..size / B {
+            let sums = gather::<T, B, W>(lower, row, y);
+            for (k, sum) in (row * B..).zip(sums) {
+                y[k] = std::array::from_fn(|l| p[k][l] - t[k][l] - sum[l]);
+                accumulate(&p[k], &std::array::from_fn(|l| t[k][l] + y[k][l]), &mut curvature);
             }
         }
-        if !(curvature > 0.0 && curvature.is_finite()) {
-            return Outcome::Indefinite { curvature, dof: 0 };
+        let mut steps = [0.0; W];
+        for l in 0..W {
+            if outcomes[l].is_some() {
+                continue;
+            }
+            match curvature[l] > 0.0 && curvature[l].is_finite() {
+                true => steps[l] = rho[l] / curvature[l],
+                false => {
+                    let mut length = [0.0; W];
+                    t.iter().for_each(|t| accumulate(t, t, &mut length));
+                    let curvature = curvature[l] / length[l];
+                    let curvature = if curvature.is_nan() { 0.0 } else { curvature };
+                    outcomes[l] = Some(Outcome::Indefinite { curvature, dof: place_of_largest(t, l) });
+                }
+            }
         }
-        let step = rho / curvature;
-        let alpha = T::of(step);
-        for k in 0..x.len() {
-            x[k] += alpha * t[k];
-            r[k] -= alpha * (t[k] + y[k]);
+        let (alpha, before) = (steps.map(T::of), rho);
+        rho = [0.0; W];
+        for k in 0..size {
+            for l in 0..W {
+                x[k][l] += alpha[l] * t[k][l];
+                r[k][l] -= alpha[l] * (t[k][l] + y[k][l]);
+            }
+            accumulate(&r[k], &r[k], &mut rho);
         }
-        let before = std::mem::replace(&mut rho, dot(r, r));
-        if let Some(outcome) = judge.outcome(step, before, rho) {
-            return outcome;
+        let mut beta = [T::zero(); W];
+        for l in 0..W {
+            if outcomes[l].is_none() {
+                outcomes[l] = ends[l].outcome(steps[l], before[l], rho[l]);
+                beta[l] = T::of(rho[l] / before[l]);
+            }
         }
-        let beta = T::of(rho / before);
-        for (p, &r) in p.iter_mut().zip(r.iter()) {
-            *p = r + beta * *p;
+        for (p, r) in p.iter_mut().zip(r.iter()) {
+            *p = std::array::from_fn(|l| r[l] + beta[l] * p[l]);
+        }
+    }
+    outcomes.map(|outcome| outcome.unwrap_or(Outcome::Converged { iterations: 0 }))
+}
+
+/// Applies a function of the B entries of a row to each right-hand side.
+#[inline(always)]
+fn each_lane<T: Scalar, const B: usize, const W: usize>(
+    x: &Row<T, B, W>,
+    act: impl Fn([T; B]) -> [T; B],
+) -> Row<T, B, W> {
+    let lanes: [[T; B]; W] = std::array::from_fn(|l| act(x.map(|x| x[l])));
+    std::array::from_fn(|k| std::array::from_fn(|l| lanes[l][k]))
+}
+
+/// Σ_J L_IJ y_J of block row I.
+#[inline(always)]
+fn gather<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    row: usize,
+    y: &[Lanes<T, W>],
+) -> Row<T, B, W> {
+    let range = lower.pointers[row]..lower.pointers[row + 1];
+    let mut sums = [[[T::zero(); W]; B]; B];
+    let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
+    for (&column, block) in lower.columns[range].iter().zip(blocks) {
+        let y = &y[column as usize * B..][..B];
+        for c in 0..B {
+            for r in 0..B {
+                for l in 0..W {
+                    sums[c][r][l] += block[c * B + r] * y[c][l];
+                }
+            }
+        }
+    }
+    std::array::from_fn(|r| std::array::from_fn(|l| (0..B).map(|c| sums[c][r][l]).sum()))
+}
+
+/// `y_J −= L_IJᵀ y_I` for all J of block row I.
+#[inline(always)]
+fn scatter<T: Scalar, const B: usize, const W: usize>(lower: &Blocks<'_, T>, row: usize, y: &mut [Lanes<T, W>]) {
+    let x: Row<T, B, W> = std::array::from_fn(|k| y[row * B + k]);
+    let range = lower.pointers[row]..lower.pointers[row + 1];
+    let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
+    for (&column, block) in lower.columns[range].iter().zip(blocks) {
+        let y = &mut y[column as usize * B..][..B];
+        for c in 0..B {
+            for l in 0..W {
+                let mut sum = T::zero();
+                for r in 0..B {
+                    sum += block[c * B + r] * x[r][l];
+                }
+                y[c][l] -= sum;
+            }
         }
     }
 }
 
-/// With any preconditioner.
-#[inline]
-fn preconditioned<T: Scalar, const B: usize>(
-    lower: &Blocks<'_, T>,
-    judge: &mut Judge,
-    [x, r, z, p, q]: [&mut [T]; 5],
-    apply: impl Fn(&[T], &mut [T]),
-) -> Outcome {
-    apply(r, z);
-    let mut rho = dot(r, z);
-    judge.begin(rho);
-    p.copy_from_slice(z);
-    loop {
-        product::<T, B>(lower, p, q);
-        let curvature = dot(p, q);
-        if !(curvature > 0.0 && curvature.is_finite()) {
-            return Outcome::Indefinite { curvature, dof: 0 };
-        }
-        let step = rho / curvature;
-        let alpha = T::of(step);
-        for k in 0..x.len() {
-            x[k] += alpha * p[k];
-            r[k] -= alpha * q[k];
-        }
-        apply(r, z);
-        let before = std::mem::replace(&mut rho, dot(r, z));
-        if let Some(outcome) = judge.outcome(step, before, rho) {
-            return outcome;
-        }
-        let beta = T::of(rho / before);
-        for (p, &z) in p.iter_mut().zip(z.iter()) {
-            *p = z + beta * *p;
-        }
+/// `sums += x y` in double precision: in an f32 run products of long vectors would otherwise lose digits or overflow.
+#[inline(always)]
+fn accumulate<T: Scalar, const W: usize>(x: &Lanes<T, W>, y: &Lanes<T, W>, sums: &mut Lanes<f64, W>) {
+    for l in 0..W {
+        sums[l] += x[l].value() * y[l].value();
     }
+}
+
+/// The place of the largest entry of one of the vectors.
+fn place_of_largest<T: Scalar, const W: usize>(x: &[Lanes<T, W>], lane: usize) -> usize {
+    let sizes = x.iter().map(|x| x[lane].abs()).enumerate();
+    sizes.fold((0, T::zero()), |largest, (place, size)| if size > largest.1 { (place, size) } else { largest }).0
 }

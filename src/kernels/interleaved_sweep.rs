@@ -5,7 +5,7 @@
 //! longer than one.
 #![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
-use super::cholesky::Supernodal;
+use super::cholesky::{Supernodal, supernodes};
 use super::sweep::Panel;
 use crate::scalar::Scalar;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
@@ -18,49 +18,58 @@ const GROUP: usize = 4;
 pub(crate) const WIDEST: usize = 8;
 const NARROW: usize = 4;
 
-/// Number of rows of `WIDEST` values for a solve: the vectors, and the rows of the tallest supernode.
-pub(crate) fn room(dofs: usize, tallest: usize) -> usize {
-    dofs + tallest
-}
-
-/// Solves in place for the columns of `rhs`, at most `WIDEST`. `order` lists the dofs in elimination order; `memory`
-/// has the size returned by [`room`].
+/// Solves in place for the columns of `rhs`, at most `WIDEST`, with the trailing block of the factor that starts at
+/// column `first`. `order` lists the rows of `rhs` in elimination order; `memory` has `WIDEST` values for each of them
+/// and for each row of the tallest supernode.
 #[inline]
-pub(crate) fn solve<T: Scalar>(factor: &Supernodal<'_, T>, order: Option<&[usize]>, rhs: &mut [T], memory: &mut [T]) {
-    match rhs.len() <= NARROW * factor.symbolic.nrows() {
-        true => solve_together::<T, NARROW>(factor, order, rhs, memory),
-        false => solve_together::<T, WIDEST>(factor, order, rhs, memory),
+pub(crate) fn solve<T: Scalar>(
+    factor: &Supernodal<'_, T>,
+    first: usize,
+    order: Option<&[usize]>,
+    rhs: &mut [T],
+    memory: &mut [T],
+) {
+    match rhs.len() <= NARROW * (factor.symbolic.nrows() - first) {
+        true => solve_together::<T, NARROW>(factor, first, order, rhs, memory),
+        false => solve_together::<T, WIDEST>(factor, first, order, rhs, memory),
     }
 }
 
 fn solve_together<T: Scalar, const W: usize>(
     factor: &Supernodal<'_, T>,
+    first: usize,
     order: Option<&[usize]>,
     rhs: &mut [T],
     memory: &mut [T],
 ) {
-    let (dofs, arch) = (factor.symbolic.nrows(), Arch::new());
-    let dof = |k: usize| order.map_or(k, |order| order[k]);
-    let (x, w) = memory.as_chunks_mut::<W>().0.split_at_mut(dofs);
+    let (columns, arch) = (first..factor.symbolic.nrows(), Arch::new());
+    let row = |k: usize| order.map_or(k, |order| order[k]);
+    let (x, w) = memory.as_chunks_mut::<W>().0.split_at_mut(columns.len());
     x.fill([T::zero(); W]);
-    for (lane, rhs) in rhs.chunks_exact(dofs).enumerate() {
-        x.iter_mut().enumerate().for_each(|(k, x)| x[lane] = rhs[dof(k)]);
+    for (lane, rhs) in rhs.chunks_exact(columns.len()).enumerate() {
+        x.iter_mut().enumerate().for_each(|(k, x)| x[lane] = rhs[row(k)]);
     }
-    let supernodes = 0..factor.symbolic.n_supernodes();
+    let supernodes = supernodes(factor, &columns);
     for s in supernodes.clone() {
-        forward(&Panel::whole(factor, s), arch, x, w);
+        forward(&Panel::new(factor, s, &columns), arch, first, x, w);
     }
     for s in supernodes.rev() {
-        backward(&Panel::whole(factor, s), arch, x, w);
+        backward(&Panel::new(factor, s, &columns), arch, first, x, w);
     }
-    for (lane, rhs) in rhs.chunks_exact_mut(dofs).enumerate() {
-        x.iter().enumerate().for_each(|(k, x)| rhs[dof(k)] = x[lane]);
+    for (lane, rhs) in rhs.chunks_exact_mut(columns.len()).enumerate() {
+        x.iter().enumerate().for_each(|(k, x)| rhs[row(k)] = x[lane]);
     }
 }
 
-/// Eliminates the columns of a supernode.
-fn forward<T: Scalar, const W: usize>(panel: &Panel<'_, T>, arch: Arch, x: &mut [[T; W]], w: &mut [[T; W]]) {
-    let (start, size) = (panel.start, panel.size);
+/// Eliminates the columns of a supernode; `x` starts at column `first`.
+fn forward<T: Scalar, const W: usize>(
+    panel: &Panel<'_, T>,
+    arch: Arch,
+    first: usize,
+    x: &mut [[T; W]],
+    w: &mut [[T; W]],
+) {
+    let (start, size) = (panel.start - first, panel.size);
     let w = &mut w[..panel.rows];
     w[..size].copy_from_slice(&x[start..start + size]);
     w[size..].fill([T::zero(); W]);
@@ -69,16 +78,22 @@ fn forward<T: Scalar, const W: usize>(panel: &Panel<'_, T>, arch: Arch, x: &mut 
     (grouped..size).for_each(|column| eliminate::<T, W, 1>(panel, arch, column, w));
     x[start..start + size].copy_from_slice(&w[..size]);
     for (&row, change) in panel.pattern.iter().zip(&w[size..]) {
-        x[row].iter_mut().zip(change).for_each(|(x, change)| *x += *change);
+        x[row - first].iter_mut().zip(change).for_each(|(x, change)| *x += *change);
     }
 }
 
-/// Solves for the columns of a supernode.
-fn backward<T: Scalar, const W: usize>(panel: &Panel<'_, T>, arch: Arch, x: &mut [[T; W]], w: &mut [[T; W]]) {
-    let (start, size) = (panel.start, panel.size);
+/// Solves for the columns of a supernode; `x` starts at column `first`.
+fn backward<T: Scalar, const W: usize>(
+    panel: &Panel<'_, T>,
+    arch: Arch,
+    first: usize,
+    x: &mut [[T; W]],
+    w: &mut [[T; W]],
+) {
+    let (start, size) = (panel.start - first, panel.size);
     let w = &mut w[..panel.rows];
     w[..size].copy_from_slice(&x[start..start + size]);
-    w[size..].iter_mut().zip(panel.pattern).for_each(|(w, &row)| *w = x[row]);
+    w[size..].iter_mut().zip(panel.pattern).for_each(|(w, &row)| *w = x[row - first]);
     let grouped = size - size % GROUP;
     (grouped..size).rev().for_each(|column| substitute::<T, W, 1>(panel, arch, column, w));
     (0..grouped).step_by(GROUP).rev().for_each(|column| substitute::<T, W, GROUP>(panel, arch, column, w));

@@ -7,13 +7,6 @@ use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu};
 use faer::{Conj, MatMut, Par, Spec};
 
-/// Whether a factor solves with A or with Aᵀ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    Given,
-    Transposed,
-}
-
 /// Factorizes with partial pivoting; the error has the failing column in the elimination order.
 #[inline]
 pub(crate) fn factorize<T: Scalar>(
@@ -29,24 +22,18 @@ pub(crate) fn factorize<T: Scalar>(
 #[inline]
 pub(crate) fn solve<T: Scalar>(
     (symbolic, numeric): (&SymbolicLu<usize>, &NumericLu<usize, T>),
-    side: Side,
     rhs: &mut [T],
     columns: usize,
     memory: &mut MemBuffer,
 ) {
     let rhs = MatMut::from_column_major_slice_mut(rhs, symbolic.nrows(), columns);
-    let (factor, stack) = (LuRef::new_unchecked(symbolic, numeric), MemStack::new(memory));
-    match side {
-        Side::Given => factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
-        Side::Transposed => factor.solve_transpose_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
-    }
+    let factor = LuRef::new_unchecked(symbolic, numeric);
+    factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(memory));
 }
 
 /// Scratch for factorizing and for solving `columns` right-hand sides.
 #[inline]
 pub(crate) fn scratch<T: Scalar>(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq {
-    let solve = symbolic
-        .solve_in_place_scratch::<T>(columns, Par::Seq)
-        .or(symbolic.solve_transpose_in_place_scratch::<T>(columns, Par::Seq));
+    let solve = symbolic.solve_in_place_scratch::<T>(columns, Par::Seq);
     solve.or(symbolic.factorize_numeric_lu_scratch::<T>(Par::Seq, Spec::default()))
 }

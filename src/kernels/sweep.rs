@@ -8,7 +8,7 @@
 //! which also share large supernodes.
 #![allow(clippy::inline_always)] // only inlined code is compiled for the vector units
 
-use super::cholesky::{Columns, Supernodal, supernodes};
+use super::cholesky::{RightHandSide, Supernodal, supernodes};
 use super::forest::Forest;
 use super::plan::Plan;
 use crate::scalar::Scalar;
@@ -27,22 +27,28 @@ const SHARE: usize = 16;
 
 /// A factor and its forest.
 #[derive(Debug)]
-pub(crate) struct Interior<'a, T> {
-    pub(crate) factor: Supernodal<'a, T>,
-    pub(crate) forest: &'a Forest,
+struct Interior<'a, T> {
+    factor: Supernodal<'a, T>,
+    forest: &'a Forest,
 }
 
 /// Forward over a forest: on return the work vector of each supernode holds its unknowns of L y = b, followed by its
 /// contribution to the parent. `b` is the right-hand side; column k reads its entry `order[k]`, or k without an
 /// order.
-pub(crate) fn forest_forward<T: Scalar>(interior: &Interior<'_, T>, b: &[T], order: Option<&[usize]>, w: &mut [T]) {
-    forward_plan(&interior.forest.plan, &Forward { interior, b, order }, 0, w);
+pub(crate) fn forest_forward<T: Scalar>(
+    factor: Supernodal<'_, T>,
+    forest: &Forest,
+    b: &[T],
+    order: Option<&[usize]>,
+    w: &mut [T],
+) {
+    forward_plan(&forest.plan, &Forward { interior: &Interior { factor, forest }, b, order }, 0, w);
 }
 
 /// Backward over a forest: on return the work vector of each supernode holds its unknowns of Lᵀ x = y. On entry the
 /// work vectors of the roots hold the solution on the rows below them.
-pub(crate) fn forest_backward<T: Scalar>(interior: &Interior<'_, T>, w: &mut [T]) {
-    backward_plan(&interior.forest.plan, interior, 0, w);
+pub(crate) fn forest_backward<T: Scalar>(factor: Supernodal<'_, T>, forest: &Forest, w: &mut [T]) {
+    backward_plan(&forest.plan, &Interior { factor, forest }, 0, w);
 }
 
 /// Input of forward sweeps.
@@ -146,7 +152,7 @@ pub(super) struct Panel<'a, T> {
 
 impl<'a, T> Panel<'a, T> {
     #[inline]
-    fn new(factor: &Supernodal<'a, T>, supernode: usize, columns: &Range<usize>) -> Self {
+    pub(super) fn new(factor: &Supernodal<'a, T>, supernode: usize, columns: &Range<usize>) -> Self {
         let symbolic = factor.symbolic;
         let (begin, behind) = (symbolic.supernode_begin()[supernode], symbolic.supernode_end()[supernode]);
         let pattern = symbolic.supernode(supernode).pattern();
@@ -172,7 +178,7 @@ impl<'a, T> Panel<'a, T> {
 
     /// All of a supernode.
     #[inline]
-    pub(super) fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
+    fn whole(factor: &Supernodal<'a, T>, supernode: usize) -> Self {
         let symbolic = factor.symbolic;
         Self::new(factor, supernode, &(symbolic.supernode_begin()[supernode]..symbolic.supernode_end()[supernode]))
     }
@@ -320,10 +326,10 @@ fn groups(columns: &Range<usize>) -> [usize; 2] {
 }
 
 /// Forward over `columns` for one right-hand side.
-pub(super) fn forward<T: Scalar>(
+pub(crate) fn forward<T: Scalar>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
-    Columns { values: x, skipped, scratch }: Columns<'_, T>,
+    RightHandSide { values: x, skipped, scratch }: RightHandSide<'_, T>,
 ) {
     let arch = Arch::new();
     for supernode in supernodes(factor, &columns) {
@@ -341,10 +347,10 @@ pub(super) fn forward<T: Scalar>(
 }
 
 /// Backward over `columns` for one right-hand side; later entries hold the solution.
-pub(super) fn backward<T: Scalar>(
+pub(crate) fn backward<T: Scalar>(
     factor: &Supernodal<'_, T>,
     columns: Range<usize>,
-    Columns { values: x, skipped, scratch }: Columns<'_, T>,
+    RightHandSide { values: x, skipped, scratch }: RightHandSide<'_, T>,
 ) {
     let arch = Arch::new();
     for supernode in supernodes(factor, &columns).rev() {

@@ -1,11 +1,11 @@
 //! A separate factorization for each body, that is, for each connected component of a matrix.
 
+use super::selection::Selection;
 use super::{Automatic, COLUMNS, Condensation, Diagonal, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
-use std::ops::Range;
 
 /// Factorizes each body separately.
 ///
@@ -161,63 +161,6 @@ pub(crate) fn components(pattern: SymbolicSparseColMatRef<'_, usize>) -> (Vec<us
     (body_of, bodies)
 }
 
-/// Ascending indices into a longer slice.
-#[derive(Debug)]
-enum Selection {
-    /// A whole range: that part of the slice is used in place.
-    Range(Range<usize>),
-    List(Vec<usize>),
-}
-
-impl Selection {
-    fn new(list: Vec<usize>) -> Self {
-        match (list.first(), list.last()) {
-            (Some(&first), Some(&last)) if last - first + 1 == list.len() => Self::Range(first..last + 1),
-            _ => Self::List(list),
-        }
-    }
-
-    fn len(&self) -> usize {
-        match self {
-            Self::Range(range) => range.len(),
-            Self::List(list) => list.len(),
-        }
-    }
-
-    fn at(&self, place: usize) -> usize {
-        match self {
-            Self::Range(range) => range.start + place,
-            Self::List(list) => list[place],
-        }
-    }
-
-    /// The selected entries, copied to `scratch` if they are not contiguous.
-    fn read<'x, T: Real>(&self, x: &'x [T], scratch: &'x mut [T]) -> &'x [T] {
-        match self {
-            Self::Range(range) => &x[range.clone()],
-            Self::List(_) => {
-                let scratch = &mut scratch[..self.len()];
-                self.gather(x, scratch);
-                scratch
-            }
-        }
-    }
-
-    fn gather<T: Real>(&self, from: &[T], to: &mut [T]) {
-        match self {
-            Self::Range(range) => to.copy_from_slice(&from[range.clone()]),
-            Self::List(list) => to.iter_mut().zip(list).for_each(|(to, &at)| *to = from[at]),
-        }
-    }
-
-    fn scatter<T: Real>(&self, from: &[T], to: &mut [T]) {
-        match self {
-            Self::Range(range) => to[range.clone()].copy_from_slice(from),
-            Self::List(list) => from.iter().zip(list).for_each(|(&from, &at)| to[at] = from),
-        }
-    }
-}
-
 /// One body, or all dofs that are coupled to no other.
 #[derive(Debug)]
 struct Part<T: Real> {
@@ -230,8 +173,7 @@ struct Part<T: Real> {
     factor: Box<dyn Factorization<T>>,
     /// Places of its contact dofs on the interface of the system.
     interface: Selection,
-    /// A column of its dofs, if they are not contiguous; and its solution, if it has no contact dofs or is solved on
-    /// a thread of its own.
+    /// A column of its dofs, and its solution.
     column: Vec<T>,
     /// A column of its contact dofs.
     on_interface: Vec<T>,
@@ -267,7 +209,7 @@ impl<T: Real> Part<T> {
         };
         let (column, on_interface) = (vec![T::zero(); dofs.len()], vec![T::zero(); interface.len()]);
         let entries = Selection::new(entries);
-        let values = vec![T::zero(); if matches!(entries, Selection::List(_)) { entries.len() } else { 0 }];
+        let values = vec![T::zero(); if entries.range().is_some() { 0 } else { entries.len() }];
         let (dofs, interface) = (Selection::new(dofs), Selection::new(interface));
         Ok(Self { dofs, pattern: own, entries, values, factor, interface, column, on_interface })
     }
@@ -338,7 +280,7 @@ struct Factors<T: Real> {
     /// least for `COLUMNS`.
     columns: Vec<T>,
     on_interface: Vec<T>,
-    /// Whether threads are worthwhile: each part then solves single columns in its own memory.
+    /// Whether threads are worthwhile.
     apart: bool,
 }
 
@@ -353,17 +295,16 @@ fn room<T: Real>(scratch: &mut Vec<T>, size: usize) -> &mut [T] {
 impl<T: Real> Factorization<T> for Factors<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         self.fingerprint.check(a)?;
-        match self.apart {
-            true => threads::try_each(&mut self.parts, &|part| part.factorize(a.val())),
-            false => self.parts.iter_mut().try_for_each(|part| part.factorize(a.val())),
-        }
+        self.each(|part| part.factorize(a.val()))
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { parts, size, columns, apart, .. } = self;
-        if rhs.len() == *size {
-            return if *apart { solve_apart(parts, rhs) } else { solve_in_turn(parts, rhs) };
+        if rhs.len() == self.size {
+            self.each(|part| part.solve(rhs))?;
+            self.parts.iter().for_each(|part| part.dofs.scatter(&part.column, rhs));
+            return Ok(());
         }
+        let Self { parts, size, columns, .. } = self;
         for Part { dofs, factor, .. } in parts {
             let height = dofs.len();
             let columns = room(columns, rhs.len() / *size * height);
@@ -392,38 +333,20 @@ impl<T: Real> Factorization<T> for Factors<T> {
     }
 }
 
-fn solve_apart<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
-    threads::try_each(parts, &|part| part.solve(rhs))?;
-    for part in parts {
-        part.dofs.scatter(&part.column, rhs);
-    }
-    Ok(())
-}
-
-/// As `solve_apart`, but contiguous dofs are solved in place.
-fn solve_in_turn<T: Real>(parts: &mut [Part<T>], rhs: &mut [T]) -> Result<()> {
-    for part in parts {
-        match &part.dofs {
-            Selection::Range(range) => {
-                let solved = part.factor.solve(&mut rhs[range.clone()]);
-                solved.map_err(|error| in_system(error, |dof| range.start + dof))?;
-            }
-            Selection::List(_) => {
-                part.solve(rhs)?;
-                part.dofs.scatter(&part.column, rhs);
-            }
+impl<T: Real> Factors<T> {
+    /// Calls `act` on every part, on several threads if that is worthwhile.
+    fn each(&mut self, act: impl Fn(&mut Part<T>) -> Result<()> + Sync) -> Result<()> {
+        match self.apart {
+            true => threads::try_each(&mut self.parts, &act),
+            false => self.parts.iter_mut().try_for_each(act),
         }
     }
-    Ok(())
 }
 
 /// Parts with contact dofs are condensed; `condensation` has checked that they can be. The others are solved.
 impl<T: Real> Condensation<T> for Factors<T> {
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
-        match self.apart {
-            true => threads::try_each(&mut self.parts, &|part| part.condense(rhs))?,
-            false => self.parts.iter_mut().try_for_each(|part| part.condense(rhs))?,
-        }
+        self.each(|part| part.condense(rhs))?;
         for part in &self.parts {
             part.interface.scatter(&part.on_interface, interface);
         }
@@ -431,25 +354,8 @@ impl<T: Real> Condensation<T> for Factors<T> {
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
-        if self.apart {
-            threads::try_each(&mut self.parts, &|part| part.expand(interface))?;
-            for part in &self.parts {
-                part.dofs.scatter(&part.column, solution);
-            }
-            return Ok(());
-        }
-        for part in &mut self.parts {
-            let Part { dofs, factor, interface: places, on_interface, .. } = part;
-            let condensed = factor.condensation().filter(|_| places.len() > 0);
-            if let (Selection::Range(range), Some(condensed)) = (dofs, condensed) {
-                // In place.
-                let expanded = condensed.expand(places.read(interface, on_interface), &mut solution[range.clone()]);
-                expanded.map_err(|error| in_system(error, |dof| range.start + dof))?;
-            } else {
-                part.expand(interface)?;
-                part.dofs.scatter(&part.column, solution);
-            }
-        }
+        self.each(|part| part.expand(interface))?;
+        self.parts.iter().for_each(|part| part.dofs.scatter(&part.column, solution));
         Ok(())
     }
 

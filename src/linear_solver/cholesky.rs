@@ -2,18 +2,20 @@
 
 use super::ordering::{self, Ordering};
 use super::shared::Analyses;
-use super::{COLUMNS, Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
+use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
-use crate::kernels::cholesky::{Columns, Factorization as Kind, Simplicial, Supernodal};
+use crate::kernels::cholesky::{RightHandSide, Simplicial, Supernodal};
 use crate::kernels::elimination::Elimination;
 use crate::kernels::forest::Forest;
-use crate::kernels::interleaved_sweep::{self, WIDEST};
+use crate::kernels::interleaved_sweep::WIDEST;
 use crate::kernels::supernodal::{Problem, Workspace};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::threads::PerThread;
 use crate::{memory, sparse};
 use faer::dyn_stack::{MemBuffer, StackReq};
 use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
@@ -157,40 +159,52 @@ impl Cholesky {
 struct Factor<T: Real> {
     fingerprint: Fingerprint,
     symbolic: Arc<SymbolicCholesky<usize>>,
-    kind: Kind,
     values: Vec<T>,
-    memory: Option<MemBuffer>,
-    /// How a supernodal factor is computed, and the workspaces of threads for it.
-    elimination: Option<Elimination>,
-    workspaces: Option<PerThread<Workspace<T>>>,
-    /// Memory of solves for several right-hand sides.
-    together: Vec<T>,
+    method: Method<T>,
     /// Pivots in the numbering of the matrix.
     pivots: Vec<T>,
-    /// The interior of a supernodal factor, and the work vectors of its supernodes.
-    forest: Option<Forest>,
-    work: Vec<T>,
-    /// One right-hand side in the order of elimination; its entries in the forest are in `work`.
+    /// One right-hand side in the order of elimination; its entries in the forest are in the work vectors.
     sweep: Vec<T>,
-    /// The place of each interface dof among those eliminated last.
+    /// The dofs eliminated last, by their number in the list of contact dofs, in the order of elimination.
     interface: Vec<usize>,
-    /// Columns on the interface in the order of elimination; capacity for `COLUMNS`, or the largest number solved so
-    /// far.
+    /// One column on the interface in the order of elimination.
     trailing: Vec<T>,
-    /// Memory for the rows below any supernode, for as many columns.
+    /// Memory for the rows of any supernode.
     below: Vec<T>,
     /// Memory of the check of symmetry.
     cursor: Vec<usize>,
 }
 
+/// How the factor is computed and swept.
+enum Method<T> {
+    /// A simplicial L D Lᵀ, with the scratch of its factorization.
+    Simplicial(Option<MemBuffer>),
+    /// A supernodal L Lᵀ.
+    Supernodal(Supernodes<T>),
+}
+
+/// The data of a supernodal factor.
+struct Supernodes<T> {
+    elimination: Elimination,
+    /// Workspaces of threads for a factorization.
+    workspaces: Option<PerThread<Workspace<T>>>,
+    /// Memory of solves for several right-hand sides.
+    together: Vec<T>,
+    /// The interior, and the work vectors of its supernodes.
+    forest: Forest,
+    work: Vec<T>,
+    /// The largest number of rows of a supernode, which bounds the rows below any part of its columns.
+    tallest: usize,
+}
+
 /// In a matrix with `n` dofs a pivot below this share of its diagonal entry is zero up to rounding.
 pub(super) fn negligible<T: Real>(n: usize) -> T {
-    T::of(16.0 * (n as f64).sqrt()) * T::epsilon()
+    rounding(T::of((n as f64).sqrt()))
 }
 
 impl<T: Real> std::fmt::Debug for Factor<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Factor").field("kind", &self.kind).field("values", &self.values.len()).finish_non_exhaustive()
+        f.debug_struct("Factor").field("values", &self.values.len()).finish_non_exhaustive()
     }
 }
 
@@ -203,46 +217,29 @@ impl<T: Real> LinearSolver<T> for Cholesky {
         check_analysis(pattern, last)?;
         let symbolic = self.symbolic(pattern, last)?;
         let values = memory::zeros(symbolic.len_val(), 1, "a sparse Cholesky factor")?;
-        let (kind, below) = match symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(_) => (Kind::Ldlt, 0),
-            SymbolicCholeskyRaw::Supernodal(raw) => (Kind::Llt, tallest(raw)),
-        };
-        let memory = match kind {
-            Kind::Ldlt => Some(buffer(T::cholesky_scratch(&symbolic))?),
-            Kind::Llt => None,
-        };
         let n = symbolic.nrows();
         let first = n - last.len();
         let place = |dof: usize| symbolic.perm().map_or(dof, |perm| perm.arrays().1[dof]);
-        let interface: Vec<usize> = last.iter().map(|&dof| place(dof) - first).collect();
-        let (forest, elimination, workspaces) = match symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(_) => (None, None, None),
-            SymbolicCholeskyRaw::Supernodal(raw) => {
-                (Some(Forest::new(raw, first)?), Some(Elimination::new(raw)?), Some(workspaces(n)?))
-            }
+        let mut interface = vec![0; last.len()];
+        last.iter().enumerate().for_each(|(number, &dof)| interface[place(dof) - first] = number);
+        let method = match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(_) => Method::Simplicial(Some(buffer(T::cholesky_scratch(&symbolic))?)),
+            SymbolicCholeskyRaw::Supernodal(raw) => Method::Supernodal(Supernodes::new(raw, first)?),
         };
-        let work = memory::zeros(forest.as_ref().map_or(0, Forest::work), 1, "the sweeps of a sparse Cholesky factor")?;
-        let (pivots, sweep) = (vec![T::zero(); n], vec![T::zero(); n]);
-        let what = "the interface of a sparse Cholesky factor";
-        let trailing = memory::zeros(COLUMNS, last.len(), what)?;
-        // Without an interface, sweeps over one right-hand side still need memory.
-        let below = memory::zeros(if last.is_empty() { 1 } else { COLUMNS }, below, what)?;
+        let tallest = match &method {
+            Method::Simplicial(_) => 0,
+            Method::Supernodal(supernodes) => supernodes.tallest,
+        };
         Ok(Box::new(Factor {
             fingerprint: Fingerprint::of(pattern),
             symbolic,
-            kind,
             values,
-            memory,
-            elimination,
-            workspaces,
-            together: Vec::new(),
-            pivots,
-            forest,
-            work,
-            sweep,
+            method,
+            pivots: vec![T::zero(); n],
+            sweep: vec![T::zero(); n],
             interface,
-            trailing,
-            below,
+            trailing: vec![T::zero(); last.len()],
+            below: vec![T::zero(); tallest],
             cursor: Vec::new(),
         }))
     }
@@ -260,13 +257,32 @@ fn workspaces<T: Real>(dofs: usize) -> Result<PerThread<Workspace<T>>> {
         .ok_or(Error::OutOfMemory { what: "sparse Cholesky scratch", bytes: None })
 }
 
-/// The largest number of rows of a supernode, which bounds the rows below any part of its columns.
-fn tallest(raw: &faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky<usize>) -> usize {
-    let height = |s: usize| {
-        let columns = raw.supernode_end()[s] - raw.supernode_begin()[s];
-        columns + raw.supernode(s).pattern().len()
-    };
-    (0..raw.n_supernodes()).map(height).max().unwrap_or(0)
+impl<T: Real> Supernodes<T> {
+    /// For a factor whose columns from `first` on are the interface.
+    fn new(raw: &SymbolicSupernodalCholesky<usize>, first: usize) -> Result<Self> {
+        let forest = Forest::new(raw, first)?;
+        let height = |s: usize| {
+            let columns = raw.supernode_end()[s] - raw.supernode_begin()[s];
+            columns + raw.supernode(s).pattern().len()
+        };
+        let tallest = (0..raw.n_supernodes()).map(height).max().unwrap_or(0);
+        let mut supernodes = Self {
+            elimination: Elimination::new(raw)?,
+            workspaces: Some(workspaces(raw.nrows())?),
+            together: Vec::new(),
+            work: memory::zeros(forest.work(), 1, "the sweeps of a sparse Cholesky factor")?,
+            forest,
+            tallest,
+        };
+        let rows = supernodes.rows(raw.nrows() - first);
+        supernodes.together = memory::zeros(rows, WIDEST, "the interface of a sparse Cholesky factor")?;
+        Ok(supernodes)
+    }
+
+    /// Rows of memory for solving several right-hand sides on the interface together.
+    fn rows(&self, interface: usize) -> usize {
+        if interface > 0 { interface + self.tallest } else { 0 }
+    }
 }
 
 impl<T: Real> Factor<T> {
@@ -281,19 +297,21 @@ impl<T: Real> Factor<T> {
 
     /// Reads a right-hand side, and sweeps forward over the columns before `end`.
     fn forward(&mut self, rhs: &[T], end: usize) {
-        let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
+        let Self { symbolic, values, method, sweep: x, below, .. } = self;
         let order = symbolic.perm().map(|perm| perm.arrays().0);
-        let mut behind = 0;
-        if let (Some(forest), SymbolicCholeskyRaw::Supernodal(symbolic)) = (&*forest, symbolic.raw()) {
-            T::forest_forward(Supernodal { symbolic, values }, forest, rhs, order, work);
-            behind = forest.end;
-        }
+        let behind = match method {
+            Method::Simplicial(_) => 0,
+            Method::Supernodal(supernodes) => supernodes.forest.end,
+        };
         let x = &mut x[behind..];
         match order {
             Some(order) => x.iter_mut().zip(&order[behind..]).for_each(|(x, &dof)| *x = rhs[dof]),
             None => x.copy_from_slice(&rhs[behind..]),
         }
-        if let Some(forest) = forest {
+        if let (Method::Supernodal(Supernodes { forest, work, .. }), SymbolicCholeskyRaw::Supernodal(symbolic)) =
+            (method, symbolic.raw())
+        {
+            T::forest_forward(Supernodal { symbolic, values }, forest, rhs, order, work);
             for &root in &forest.roots {
                 for (&place, &change) in forest.places(root).iter().zip(&work[forest.update(root)]) {
                     x[place] += change;
@@ -303,56 +321,67 @@ impl<T: Real> Factor<T> {
         sweep(Sweep::Forward, (symbolic, values), behind..end, x, behind, below);
     }
 
-    /// Sweeps backward over the columns before `end`; later columns are already solved.
-    fn backward(&mut self, end: usize) {
-        let Self { symbolic, values, forest, work, sweep: x, below, .. } = self;
-        let behind = forest.as_ref().map_or(0, |forest| forest.end);
+    /// Sweeps backward over the columns before `end`; later columns are already solved. Writes the solution in the
+    /// order of the matrix.
+    fn backward(&mut self, end: usize, solution: &mut [T]) {
+        let Self { symbolic, values, method, sweep: x, below, .. } = self;
+        let order = symbolic.perm().map(|perm| perm.arrays().0);
+        let mut put = |columns: Range<usize>, x: &[T]| match order {
+            Some(order) => x.iter().zip(&order[columns]).for_each(|(&x, &dof)| solution[dof] = x),
+            None => solution[columns.clone()].copy_from_slice(&x[..columns.len()]),
+        };
+        let (Method::Supernodal(Supernodes { forest, work, .. }), SymbolicCholeskyRaw::Supernodal(raw)) =
+            (method, symbolic.raw())
+        else {
+            sweep(Sweep::Backward, (symbolic, values), 0..end, x, 0, below);
+            return put(0..x.len(), x);
+        };
+        let (behind, size) = (forest.end, x.len());
         let x = &mut x[behind..];
         sweep(Sweep::Backward, (symbolic, values), behind..end, x, behind, below);
-        if let (Some(forest), SymbolicCholeskyRaw::Supernodal(symbolic)) = (forest, symbolic.raw()) {
-            for &root in &forest.roots {
-                for (&place, known) in forest.places(root).iter().zip(&mut work[forest.update(root)]) {
-                    *known = x[place];
-                }
+        put(behind..size, x);
+        for &root in &forest.roots {
+            for (&place, known) in forest.places(root).iter().zip(&mut work[forest.update(root)]) {
+                *known = x[place];
             }
-            T::forest_backward(Supernodal { symbolic, values }, forest, work);
+        }
+        T::forest_backward(Supernodal { symbolic: raw, values }, forest, work);
+        for s in 0..forest.count() {
+            put(forest.columns(s), &work[forest.offsets[s]..]);
         }
     }
 
     fn solve_one(&mut self, column: &mut [T]) {
         let size = self.size();
         self.forward(column, size);
-        self.backward(size);
-        self.give(column);
+        self.backward(size, column);
     }
 
-    /// Solves for several columns together with a supernodal factor.
-    fn solve_together(&mut self, columns: &mut [T]) -> Result<()> {
-        let Self { symbolic, values, together, .. } = self;
-        let SymbolicCholeskyRaw::Supernodal(raw) = symbolic.raw() else { return Ok(()) };
-        let room = interleaved_sweep::room(symbolic.nrows(), tallest(raw));
-        memory::grow(together, room, WIDEST, "right-hand sides of a sparse Cholesky factor")?;
-        let order = symbolic.perm().map(|perm| perm.arrays().0);
-        T::supernodal_solve(&Supernodal { symbolic: raw, values }, order, columns, together);
-        Ok(())
-    }
-
-    /// Writes the solution in the order of the matrix.
-    fn give(&self, solution: &mut [T]) {
-        let Self { symbolic, forest, work, sweep: x, .. } = self;
-        let order = symbolic.perm().map(|perm| perm.arrays().0);
-        let mut put = |columns: Range<usize>, x: &[T]| match order {
-            Some(order) => x.iter().zip(&order[columns]).for_each(|(&x, &dof)| solution[dof] = x),
-            None => solution[columns.clone()].copy_from_slice(&x[..columns.len()]),
+    /// Solves for several columns together with the trailing block that starts at column `first`; returns whether the
+    /// factor is supernodal.
+    fn solve_together(&mut self, first: usize, columns: &mut [T]) -> Result<bool> {
+        let Self { symbolic, values, method, interface, .. } = self;
+        let (Method::Supernodal(Supernodes { together, tallest, .. }), SymbolicCholeskyRaw::Supernodal(raw)) =
+            (method, symbolic.raw())
+        else {
+            return Ok(false);
         };
-        let mut behind = 0;
-        if let Some(forest) = forest {
-            for s in 0..forest.count() {
-                put(forest.columns(s), &work[forest.offsets[s]..]);
-            }
-            behind = forest.end;
+        let rows = raw.nrows() - first + *tallest;
+        if together.len() < rows * WIDEST {
+            memory::grow(together, rows, WIDEST, "right-hand sides of a sparse Cholesky factor")?;
         }
-        put(behind..x.len(), &x[behind..]);
+        let order = if first > 0 { Some(&interface[..]) } else { symbolic.perm().map(|perm| perm.arrays().0) };
+        T::supernodal_solve(&Supernodal { symbolic: raw, values }, first, order, columns, together);
+        Ok(true)
+    }
+
+    /// Solves S x = f for one column in `trailing`, in the order of elimination.
+    fn solve_trailing(&mut self) {
+        let columns = self.trailing();
+        let Self { symbolic, values, below, trailing: x, .. } = self;
+        for direction in [Sweep::Forward, Sweep::Backward] {
+            sweep(direction, (symbolic, values), columns.clone(), x, columns.start, below);
+        }
     }
 }
 
@@ -364,7 +393,7 @@ enum Sweep {
     Backward,
 }
 
-/// Sweeps over `columns` for right-hand sides in the order of elimination, each without its first `skipped` entries.
+/// Sweeps over `columns` for a right-hand side in the order of elimination, without its first `skipped` entries.
 fn sweep<T: Real>(
     direction: Sweep,
     (symbolic, factor): (&SymbolicCholesky<usize>, &[T]),
@@ -379,7 +408,7 @@ fn sweep<T: Real>(
     match symbolic.raw() {
         SymbolicCholeskyRaw::Supernodal(symbolic) => {
             let factor = Supernodal { symbolic, values: factor };
-            let x = Columns { values, skipped, scratch };
+            let x = RightHandSide { values, skipped, scratch };
             match direction {
                 Sweep::Forward => T::supernodal_forward(&factor, columns, x),
                 Sweep::Backward => T::supernodal_backward(&factor, columns, x),
@@ -387,11 +416,9 @@ fn sweep<T: Real>(
         }
         SymbolicCholeskyRaw::Simplicial(raw) => {
             let factor = Simplicial { pointers: raw.col_ptr(), rows: raw.row_idx(), values: factor, skipped };
-            for x in values.chunks_exact_mut(symbolic.nrows() - skipped) {
-                match direction {
-                    Sweep::Forward => T::simplicial_forward(&factor, columns.clone(), x),
-                    Sweep::Backward => T::simplicial_backward(&factor, columns.clone(), x),
-                }
+            match direction {
+                Sweep::Forward => T::simplicial_forward(&factor, columns, values),
+                Sweep::Backward => T::simplicial_backward(&factor, columns, values),
             }
         }
     }
@@ -399,26 +426,29 @@ fn sweep<T: Real>(
 
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { fingerprint, symbolic, values, pivots, memory, elimination, workspaces: threads, cursor, .. } = self;
+        let Self { fingerprint, symbolic, values, method, pivots, cursor, .. } = self;
         fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, cursor)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
-        let factorized =
-            if let (SymbolicCholeskyRaw::Supernodal(raw), Some(elimination)) = (symbolic.raw(), elimination) {
-                let workspaces = match threads {
+        let factorized = match (method, symbolic.raw()) {
+            (Method::Supernodal(supernodes), SymbolicCholeskyRaw::Supernodal(raw)) => {
+                let workspaces = match &mut supernodes.workspaces {
                     Some(workspaces) => workspaces,
-                    None => threads.insert(workspaces(pivots.len())?),
+                    none => none.insert(workspaces(pivots.len())?),
                 };
                 let order = symbolic.perm().map(PermRef::arrays);
-                let problem = Problem { symbolic: raw, elimination, a, order, workspaces };
+                let problem = Problem { symbolic: raw, elimination: &supernodes.elimination, a, order, workspaces };
                 T::supernodal_cholesky(&problem, values, pivots)
-            } else {
+            }
+            (Method::Simplicial(memory), _) => {
                 let memory = match memory {
                     Some(memory) => memory,
-                    None => memory.insert(buffer(T::cholesky_scratch(symbolic))?),
+                    none => none.insert(buffer(T::cholesky_scratch(symbolic))?),
                 };
                 T::simplicial_cholesky(symbolic, a, values, pivots, memory)
-            };
+            }
+            (Method::Supernodal(_), _) => return Err(Error::Poisoned),
+        };
         factorized.map_err(singular)?;
         let negligible = negligible::<T>(pivots.len());
         // Written so that NaN is rejected too.
@@ -432,17 +462,24 @@ impl<T: Real> Factorization<T> for Factor<T> {
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
         let size = self.size();
         for columns in rhs.chunks_mut((size * WIDEST).max(1)) {
-            match self.symbolic.raw() {
-                SymbolicCholeskyRaw::Supernodal(_) if columns.len() > size => self.solve_together(columns)?,
-                _ => columns.chunks_exact_mut(size).for_each(|column| self.solve_one(column)),
+            if columns.len() == size || !self.solve_together(0, columns)? {
+                columns.chunks_exact_mut(size).for_each(|column| self.solve_one(column));
             }
         }
         Ok(())
     }
 
     fn release(&mut self) {
-        (self.memory, self.workspaces) = (None, None);
-        (self.cursor, self.together) = (Vec::new(), Vec::new());
+        self.cursor = Vec::new();
+        match &mut self.method {
+            Method::Simplicial(memory) => *memory = None,
+            Method::Supernodal(supernodes) => {
+                supernodes.workspaces = None;
+                // Steps solve on the interface without allocating.
+                supernodes.together.truncate(supernodes.rows(self.interface.len()) * WIDEST);
+                supernodes.together.shrink_to_fit();
+            }
+        }
     }
 
     fn stored_values(&self) -> usize {
@@ -458,55 +495,29 @@ impl<T: Real> Condensation<T> for Factor<T> {
     fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
         let trailing = self.trailing();
         self.forward(rhs, trailing.start);
-        let Self { symbolic, values, sweep: x, below, trailing: on_interface, interface: places, .. } = self;
-        let on_interface = &mut on_interface[..places.len()];
-        on_interface.copy_from_slice(&x[trailing.clone()]);
-        sweep(Sweep::Forward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
-        sweep(Sweep::Backward, (symbolic, values), trailing.clone(), on_interface, trailing.start, below);
-        for (x, &place) in interface.iter_mut().zip(places.iter()) {
-            *x = on_interface[place];
-        }
+        self.trailing.copy_from_slice(&self.sweep[trailing]);
+        self.solve_trailing();
+        self.interface.iter().zip(&self.trailing).for_each(|(&number, &x)| interface[number] = x);
         Ok(())
     }
 
     fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
         let first = self.trailing().start;
-        for (&value, &place) in interface.iter().zip(&self.interface) {
-            self.sweep[first + place] = value;
-        }
-        self.backward(first);
-        self.give(solution);
+        self.interface.iter().zip(&mut self.sweep[first..]).for_each(|(&number, x)| *x = interface[number]);
+        self.backward(first, solution);
         Ok(())
     }
 
     fn solve(&mut self, forces: &mut [T]) -> Result<()> {
-        let trailing = self.trailing();
-        let height = trailing.len();
-        if height == 0 {
-            return Ok(());
-        }
-        let Self { symbolic, values, below, trailing: x, interface: places, .. } = self;
-        let columns = forces.len() / height;
-        if x.len() < forces.len() {
-            let what = "the interface of a sparse Cholesky factor";
-            memory::grow(x, forces.len(), 1, what)?;
-            let tall = match symbolic.raw() {
-                SymbolicCholeskyRaw::Simplicial(_) => 0,
-                SymbolicCholeskyRaw::Supernodal(raw) => tallest(raw),
-            };
-            memory::grow(below, tall, columns, what)?;
-        }
-        let x = &mut x[..forces.len()];
-        for (forces, x) in forces.chunks_exact(height).zip(x.chunks_exact_mut(height)) {
-            for (&force, &place) in forces.iter().zip(places.iter()) {
-                x[place] = force;
+        let (first, height) = (self.trailing().start, self.interface.len());
+        for columns in forces.chunks_mut((height * WIDEST).max(1)) {
+            if columns.len() > height && self.solve_together(first, columns)? {
+                continue;
             }
-        }
-        sweep(Sweep::Forward, (symbolic, values), trailing.clone(), x, trailing.start, below);
-        sweep(Sweep::Backward, (symbolic, values), trailing.clone(), x, trailing.start, below);
-        for (forces, x) in forces.chunks_exact_mut(height).zip(x.chunks_exact(height)) {
-            for (force, &place) in forces.iter_mut().zip(places.iter()) {
-                *force = x[place];
+            for column in columns.chunks_exact_mut(height) {
+                self.interface.iter().zip(&mut self.trailing).for_each(|(&number, x)| *x = column[number]);
+                self.solve_trailing();
+                self.interface.iter().zip(&self.trailing).for_each(|(&number, &x)| column[number] = x);
             }
         }
         Ok(())

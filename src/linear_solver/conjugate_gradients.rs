@@ -2,32 +2,19 @@
 
 use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
-use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Sweeps, Vectors};
+use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Vectors};
 use crate::memory;
 use crate::real::Real;
 use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
-/// The preconditioner of [`ConjugateGradients`]. All act on blocks of the two or three dofs of a node, if the pattern
-/// of the matrix has such blocks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Preconditioner {
-    /// The diagonal blocks. For comparison only: the other two need fewer iterations.
-    Nodes,
-    /// A forward and a backward Gauss–Seidel sweep, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat (SIAM J. Sci.
-    /// Stat. Comput. 2, 1981), in which an iteration costs little more than a product with A. Needs no extra memory.
-    #[default]
-    GaussSeidel,
-    /// Incomplete Cholesky factorization without fill (Meijerink and van der Vorst, Math. Comput. 31, 1977), with a
-    /// growing shift of the diagonal if it breaks down (Manteuffel, Math. Comput. 34, 1980). Fewer iterations at
-    /// twice the cost each, and as much extra memory as the matrix.
-    IncompleteCholesky,
-}
-
 /// Preconditioned conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) for symmetric
 /// positive definite matrices: an iteration instead of a factor, for large solid bodies at small steps.
+///
+/// The preconditioner is a forward and a backward Gauss–Seidel sweep, (D + L) D⁻¹ (D + Lᵀ), in the form of Eisenstat
+/// (SIAM J. Sci. Stat. Comput. 2, 1981), in which an iteration costs little more than a product with A. D are the
+/// diagonal blocks of the two or three dofs of a node, if the pattern of the matrix has such blocks.
 ///
 /// At small steps inertia dominates the effective matrix w_ā/h² M + K: its condition number is about 1 + Co² with the
 /// Courant number Co of the step, for any size of the body, and few iterations suffice. `docs/performance.md` gives
@@ -77,13 +64,12 @@ pub enum Preconditioner {
 pub struct ConjugateGradients {
     tolerance: f64,
     iterations: usize,
-    preconditioner: Preconditioner,
 }
 
 impl Default for ConjugateGradients {
-    /// Tolerance 1e-10, at most 1000 iterations, [`Preconditioner::GaussSeidel`].
+    /// Tolerance 1e-10, at most 1000 iterations.
     fn default() -> Self {
-        Self { tolerance: 1e-10, iterations: 1000, preconditioner: Preconditioner::default() }
+        Self { tolerance: 1e-10, iterations: 1000 }
     }
 }
 
@@ -112,12 +98,6 @@ impl ConjugateGradients {
     pub fn iterations(self, iterations: usize) -> Self {
         Self { iterations, ..self }
     }
-
-    /// The preconditioner, [`Preconditioner::GaussSeidel`] by default.
-    #[must_use]
-    pub fn preconditioner(self, preconditioner: Preconditioner) -> Self {
-        Self { preconditioner, ..self }
-    }
 }
 
 /// A scaled matrix in blocks, and memory for the iteration.
@@ -133,9 +113,6 @@ struct Matrix<T: Real> {
     values: Vec<T>,
     /// C⁻¹ of the diagonal blocks C Cᵀ.
     scaling: Vec<T>,
-    /// The incomplete factor, if there is one: blocks below the diagonal, and the inverses of the diagonal blocks.
-    factor: Vec<T>,
-    inverses: Vec<T>,
     /// Five vectors.
     vectors: Vec<T>,
     /// Memory of the check of symmetry.
@@ -214,13 +191,8 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
             return Err(Error::Empty { what: "the pattern", remedy: "a system has at least one dof" });
         };
         let what = "a matrix in blocks";
-        let square = size * size;
-        let values = memory::zeros(columns.len(), square, what)?;
+        let values = memory::zeros(columns.len(), size * size, what)?;
         let scaling = memory::zeros(dofs, size, what)?;
-        let (blocks, diagonal) = match self.preconditioner {
-            Preconditioner::IncompleteCholesky => (columns.len(), dofs),
-            Preconditioner::Nodes | Preconditioner::GaussSeidel => (0, 0),
-        };
         Ok(Box::new(Matrix {
             settings: *self,
             dofs,
@@ -230,8 +202,6 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
             columns,
             values,
             scaling,
-            factor: memory::zeros(blocks, square, what)?,
-            inverses: memory::zeros(diagonal, size, what)?,
             vectors: memory::zeros(dofs, 5, "the vectors of conjugate gradients")?,
             cursor: Vec::with_capacity(dofs),
             state: Ready::No,
@@ -274,20 +244,6 @@ impl<T: Real> Matrix<T> {
         }
         Ok(())
     }
-
-    fn incomplete(&mut self) -> Result<()> {
-        let Self { size, pointers, columns, values, factor, inverses, .. } = self;
-        let lower = Blocks { pointers, columns, values };
-        // The shift starts at a thousandth of the diagonal and is doubled: for any matrix with a unit diagonal the
-        // factor exists for a sufficiently large shift.
-        let shifts = std::iter::successors(Some(1e-3), |shift| Some(2.0 * shift)).take_while(|shift| *shift < 1e6);
-        for shift in std::iter::once(0.0).chain(shifts) {
-            if T::incomplete_cholesky(*size, &lower, T::of(shift), factor, inverses) {
-                return Ok(());
-            }
-        }
-        Err(Error::Singular { matrix: "effective matrix", dof: 0 })
-    }
 }
 
 impl<T: Real> Factorization<T> for Matrix<T> {
@@ -298,15 +254,12 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         self.fill(a)?;
         T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)
             .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })?;
-        if self.settings.preconditioner == Preconditioner::IncompleteCholesky {
-            self.incomplete()?;
-        }
         self.state = Ready::Yes;
         Ok(())
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { settings, dofs, size, pointers, columns, values, scaling, factor, inverses, vectors, .. } = self;
+        let Self { settings, dofs, size, pointers, columns, values, scaling, vectors, .. } = self;
         if self.state == Ready::No {
             let part = "conjugate gradients".into();
             return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
@@ -314,23 +267,16 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         if !rhs.len().is_multiple_of(*dofs) {
             return Err(Error::Dimension { what: "right-hand side", expected: *dofs, found: rhs.len() });
         }
-        let sweeps = match settings.preconditioner {
-            Preconditioner::Nodes => Sweeps::Nodes,
-            Preconditioner::GaussSeidel => Sweeps::GaussSeidel,
-            Preconditioner::IncompleteCholesky => {
-                Sweeps::Incomplete { factor: Blocks { pointers, columns, values: factor }, inverses }
-            }
-        };
         let lower = Blocks { pointers, columns, values };
         let (tolerance, limit) = (settings.tolerance, settings.iterations);
         let resolution = T::epsilon().value();
-        let iteration = Iteration { lower, scaling, sweeps, tolerance, resolution, limit };
+        let iteration = Iteration { lower, scaling, tolerance, resolution, limit };
         self.iterations = 0;
         for column in rhs.chunks_exact_mut(*dofs) {
-            let mut parts = vectors.chunks_exact_mut(*dofs);
-            let mut next = || parts.next().unwrap_or_default();
-            let vectors = Vectors { x: next(), r: next(), p: next(), t: next(), q: next() };
-            let iterations = match T::conjugate_gradients(*size, &iteration, column, vectors) {
+            vectors[*dofs..2 * *dofs].copy_from_slice(column);
+            let [outcome] = T::conjugate_gradients(*size, &iteration, Vectors::of(vectors, *dofs));
+            column.copy_from_slice(&vectors[..*dofs]);
+            let iterations = match outcome {
                 Outcome::Converged { iterations } => iterations,
                 Outcome::NotConverged { iterations, residual } => {
                     let method = "conjugate gradients";
@@ -344,7 +290,7 @@ impl<T: Real> Factorization<T> for Matrix<T> {
     }
 
     fn stored_values(&self) -> usize {
-        [&self.values, &self.scaling, &self.factor, &self.inverses, &self.vectors].iter().map(|part| part.len()).sum()
+        [&self.values, &self.scaling, &self.vectors].iter().map(|part| part.len()).sum()
     }
 
     fn iterations(&self) -> usize {

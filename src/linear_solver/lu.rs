@@ -1,15 +1,15 @@
 //! Sparse LU through faer: matrices that are not symmetric, or not definite.
 
-use super::{Factorization, LinearSolver, check_analysis};
+use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
-use crate::kernels::lu::Side;
 use crate::memory;
 use crate::real::Real;
-use crate::sparse;
+use crate::rounding::rounding;
+use crate::sparse::{self, scattered_signed};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::linalg::{LuError, qr};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// Sparse LU factorization with partial pivoting, for any regular matrix: unsymmetric tangents (follower loads,
 /// gyroscopic and circulatory matrices) and indefinite ones.
@@ -19,9 +19,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRe
 /// units of translations and rotations, or on a stiff body next to a soft one.
 ///
 /// **Singular matrices** are rejected as [`Error::Singular`] if their condition number, after scaling, exceeds
-/// 1/(16 ε) (Hager's estimate of the 1-norm). The solution for a generic right-hand side reveals it: one solve per
-/// factorization, and two more only if that solution is large. The named dof has the largest entry of the null
-/// vector.
+/// 1/(64 ε). It is estimated from the solution for a generic right-hand side, one solve per factorization. The named
+/// dof has the largest entry of the null vector.
 ///
 /// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
 /// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact needs a
@@ -64,9 +63,9 @@ pub struct Lu;
 struct Factor<T: Real> {
     symbolic: SymbolicLu<usize>,
     numeric: NumericLu<usize, T>,
-    state: State,
-    /// The analyzed pattern, and the scaled values R A C in it.
-    pattern: SymbolicSparseColMat<usize>,
+    is_factorized: bool,
+    fingerprint: Fingerprint,
+    /// The values of R A C.
     scaled: Vec<T>,
     /// Diagonals of R and C.
     rows: Vec<T>,
@@ -80,16 +79,12 @@ struct Factor<T: Real> {
     probe: Vec<T>,
 }
 
-/// Whether there is a factor to solve with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    None,
-    Factorized,
-}
-
 impl<T: Real> std::fmt::Debug for Factor<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Factor").field("size", &self.rows.len()).field("state", &self.state).finish_non_exhaustive()
+        f.debug_struct("Factor")
+            .field("size", &self.rows.len())
+            .field("is_factorized", &self.is_factorized)
+            .finish_non_exhaustive()
     }
 }
 
@@ -105,14 +100,13 @@ impl<T: Real> LinearSolver<T> for Lu {
         let bound = bound(pattern, &symbolic)?;
         let memory = MemBuffer::try_new(T::lu_scratch(&symbolic, 1))
             .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch", bytes: None })?;
-        let pattern = pattern.to_owned().map_err(no_memory)?;
         let zero = |columns| memory::zeros(n, columns, "a sparse LU");
         Ok(Box::new(Factor {
             symbolic,
             numeric: NumericLu::new(),
-            state: State::None,
+            is_factorized: false,
+            fingerprint: Fingerprint::of(pattern),
             scaled: memory::zeros(pattern.row_idx().len(), 1, "a sparse LU")?,
-            pattern,
             rows: zero(1)?,
             columns: zero(1)?,
             memory,
@@ -167,14 +161,6 @@ fn reciprocal_root<T: Real>(x: T) -> T {
     T::of(2.0).powi(-(binary_exponent(x) / 2))
 }
 
-/// A pseudo-random number between −1 and 1, of magnitude at least ½.
-fn scatter<T: Real>(index: usize) -> T {
-    let mixed = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let size = 0.5 + 0.5 * ((mixed >> 32) & 0xffff) as f64 / 65536.0;
-    T::of(if mixed & (1 << 50) == 0 { size } else { -size })
-}
-
 fn sum_of_sizes<T: Real>(x: &[T]) -> T {
     x.iter().map(|x| x.abs()).sum()
 }
@@ -186,27 +172,6 @@ fn largest<T: Real>(x: &[T]) -> usize {
 }
 
 impl<T: Real> Factor<T> {
-    /// Rejects another pattern than the analyzed one, and NaN and infinity.
-    fn check(&self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let pattern = self.pattern.as_ref();
-        let n = sparse::square("effective matrix", a)?;
-        if n != pattern.ncols() {
-            return Err(Error::Dimension { what: "effective matrix", expected: pattern.ncols(), found: n });
-        }
-        if a.col_nnz().is_some() || a.col_ptr() != pattern.col_ptr() || a.row_idx() != pattern.row_idx() {
-            let reason = "its pattern is not the one that was analyzed; analyze it again";
-            return Err(Error::Incompatible { part: "the effective matrix".into(), reason });
-        }
-        match a.val().iter().position(|value| !value.is_finite()) {
-            Some(at) => {
-                let column = a.col_ptr().partition_point(|&start| start <= at) - 1;
-                let (row, value) = (a.row_idx()[at], a.val()[at].value());
-                Err(Error::MatrixNotFinite { matrix: "effective", row, column, value })
-            }
-            None => Ok(()),
-        }
-    }
-
     /// Forms R A C; `Err` names a dof without entries.
     ///
     /// Rows and columns are equilibrated by the roots of their largest entries (Ruiz, RAL-TR-2001-034), which
@@ -219,32 +184,25 @@ impl<T: Real> Factor<T> {
         T::scale_into(unit, a.val(), &mut self.scaled);
         self.rows.fill(root);
         self.columns.fill(unit / root);
-        for _ in 0..PASSES {
-            if self.balance()? {
-                break;
-            }
-        }
-        Ok(())
+        (0..PASSES).try_for_each(|_| self.balance(a.symbolic()))
     }
 
-    /// One pass over the matrix; returns whether it was already balanced.
-    fn balance(&mut self) -> std::result::Result<bool, usize> {
-        let Self { pattern, scaled, rows, columns, probe: factors, .. } = self;
+    /// One pass over the matrix.
+    fn balance(&mut self, pattern: SymbolicSparseColMatRef<'_, usize>) -> std::result::Result<(), usize> {
+        let Self { scaled, rows, columns, probe: factors, .. } = self;
         factors.fill(T::zero());
         for (&row, &value) in pattern.row_idx().iter().zip(scaled.iter()) {
             factors[row] = factors[row].max(value.abs());
         }
-        let mut balanced = true;
-        for (dof, (row, factor)) in rows.iter_mut().zip(factors.iter_mut()).enumerate() {
-            if *factor == T::zero() {
-                return Err(dof);
-            }
+        if let Some(dof) = factors.iter().position(|factor| *factor == T::zero()) {
+            return Err(dof);
+        }
+        for (row, factor) in rows.iter_mut().zip(factors.iter_mut()) {
             *factor = reciprocal_root(*factor);
             *row *= *factor;
-            balanced &= *factor == T::one();
         }
         for (dof, column) in columns.iter_mut().enumerate() {
-            let range = pattern.as_ref().col_range(dof);
+            let range = pattern.col_range(dof);
             let entries = &mut scaled[range.clone()];
             let largest = entries.iter().fold(T::zero(), |largest, value| largest.max(value.abs()));
             if largest == T::zero() {
@@ -252,107 +210,77 @@ impl<T: Real> Factor<T> {
             }
             let own = reciprocal_root(largest);
             *column *= own;
-            balanced &= own == T::one();
             for (value, &row) in entries.iter_mut().zip(&pattern.row_idx()[range]) {
                 *value *= own * factors[row];
             }
         }
-        Ok(balanced)
+        Ok(())
     }
 
-    /// Factorizes the scaled values; `Err(Ok(dof))` if no pivot is left.
-    fn eliminate(&mut self) -> std::result::Result<(), std::result::Result<usize, Error>> {
-        let Self { symbolic, numeric, pattern, scaled, memory, .. } = self;
-        let a = SparseColMatRef::new(pattern.as_ref(), &scaled[..]);
-        T::lu(symbolic, a, numeric, memory).map_err(|error| match error {
+    /// Factorizes the scaled values and checks that the condition number of R A C leaves significant digits.
+    fn eliminate(&mut self, pattern: SymbolicSparseColMatRef<'_, usize>) -> std::result::Result<(), Failure> {
+        let Self { symbolic, numeric, scaled, probe, memory, .. } = self;
+        T::lu(symbolic, SparseColMatRef::new(pattern, &scaled[..]), numeric, memory).map_err(|error| match error {
             LuError::SymbolicSingular { index } => {
-                let order = symbolic.col_perm().arrays().0;
-                Ok(order.get(index).copied().unwrap_or(0))
+                Failure::Pivot(symbolic.col_perm().arrays().0.get(index).copied().unwrap_or(0))
             }
-            LuError::Generic(_) => Err(Error::OutOfMemory { what: "a sparse LU", bytes: None }),
-        })
-    }
-
-    /// Solves with R A C, or its transpose, for the probe.
-    fn solve_probe(&mut self, side: Side) {
-        let Self { symbolic, numeric, probe, memory, .. } = self;
-        T::lu_solve((symbolic, numeric), side, probe, 1, memory);
-    }
-
-    /// Whether the condition number of R A C leaves significant digits; `Err` holds the dof with the largest entry of
-    /// its null vector, and whether that is known.
-    fn judge(&mut self) -> std::result::Result<(), (usize, bool)> {
-        let norm = (0..self.rows.len())
-            .map(|dof| sum_of_sizes(&self.scaled[self.pattern.as_ref().col_range(dof)]))
-            .fold(T::zero(), T::max);
-        let verdict = |probe: &[T]| (largest(probe), T::all_finite(probe));
+            LuError::Generic(_) => Failure::OutOfMemory,
+        })?;
+        let columns = (0..pattern.ncols()).map(|dof| sum_of_sizes(&scaled[pattern.col_range(dof)]));
+        let norm = columns.fold(T::zero(), T::max);
         // A generic right-hand side: for a singular matrix the null vector dominates the solution.
-        self.probe.iter_mut().enumerate().for_each(|(i, x)| *x = scatter(i));
-        let size = sum_of_sizes(&self.probe);
-        self.solve_probe(Side::Given);
-        let generic = norm * sum_of_sizes(&self.probe) / size;
-        if generic <= T::epsilon().powf(T::of(-2.0 / 3.0)) {
-            return Ok(());
-        }
-        if !generic.is_finite() {
-            return Err(verdict(&self.probe));
-        }
-        self.probe.iter_mut().for_each(|x| *x = x.signum());
-        self.solve_probe(Side::Transposed);
-        let worst = largest(&self.probe);
-        self.probe.fill(T::zero());
-        self.probe[worst] = T::one();
-        self.solve_probe(Side::Given);
-        let condition = generic.max(norm * sum_of_sizes(&self.probe));
-        // Written so that NaN is rejected too.
-        match condition * T::of(16.0) * T::epsilon() <= T::one() {
-            true => Ok(()),
-            false => Err(verdict(&self.probe)),
+        probe.iter_mut().enumerate().for_each(|(i, x)| *x = T::of(scattered_signed(i)));
+        let size = sum_of_sizes(probe);
+        T::lu_solve((symbolic, numeric), probe, 1, memory);
+        let condition = norm * sum_of_sizes(probe) / size;
+        match condition.is_finite() {
+            true if rounding(condition) <= T::one() => Ok(()),
+            true => Err(Failure::NullVector(largest(probe))),
+            false => Err(Failure::Pivot(largest(probe))),
         }
     }
 
     /// The dof to name after an exactly zero pivot: from the null vector of the matrix perturbed by rounding.
-    fn name_singular(&mut self, found: usize) -> usize {
+    fn name_singular(&mut self, pattern: SymbolicSparseColMatRef<'_, usize>, found: usize) -> usize {
         for (at, value) in self.scaled.iter_mut().enumerate() {
-            *value += *value * scatter::<T>(at) * T::of(8.0) * T::epsilon();
+            *value += rounding(*value) * T::of(0.1 * scattered_signed(at));
         }
-        match self.eliminate() {
-            Ok(()) => match self.judge() {
-                Err((dof, true)) => dof,
-                _ => found,
-            },
-            Err(_) => found,
+        match self.eliminate(pattern) {
+            Err(Failure::NullVector(dof)) => dof,
+            _ => found,
         }
     }
 }
 
+/// Why an elimination failed.
+enum Failure {
+    OutOfMemory,
+    /// An exactly zero pivot at this dof.
+    Pivot(usize),
+    /// A matrix singular to rounding; the dof of the largest entry of its null vector.
+    NullVector(usize),
+}
+
 impl<T: Real> Factorization<T> for Factor<T> {
     fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        self.state = State::None;
-        self.check(a)?;
-        if self.rows.is_empty() {
-            self.state = State::Factorized;
-            return Ok(());
-        }
+        self.is_factorized = false;
+        self.fingerprint.check(a)?;
+        sparse::check_finite("effective", a)?;
         let singular = |dof| Error::Singular { matrix: "effective matrix", dof };
-        self.scale(a).map_err(singular)?;
-        match self.eliminate() {
-            Ok(()) => {}
-            Err(Ok(dof)) => return Err(singular(dof)),
-            Err(Err(error)) => return Err(error),
+        if !self.rows.is_empty() {
+            self.scale(a).map_err(singular)?;
+            self.eliminate(a.symbolic()).map_err(|failure| match failure {
+                Failure::OutOfMemory => Error::OutOfMemory { what: "a sparse LU", bytes: None },
+                Failure::Pivot(dof) => singular(self.name_singular(a.symbolic(), dof)),
+                Failure::NullVector(dof) => singular(dof),
+            })?;
         }
-        match self.judge() {
-            Ok(()) => {
-                self.state = State::Factorized;
-                Ok(())
-            }
-            Err((dof, true)) => Err(singular(dof)),
-            Err((dof, false)) => Err(singular(self.name_singular(dof))),
-        }
+        self.is_factorized = true;
+        Ok(())
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        if self.state == State::None {
+        if !self.is_factorized {
             let reason = "there is none: the last factorization failed, or there was no first one";
             return Err(Error::Incompatible { part: "the LU of the effective matrix".into(), reason });
         }
@@ -371,7 +299,7 @@ impl<T: Real> Factorization<T> for Factor<T> {
         };
         scale(rhs, rows);
         if count > 0 {
-            T::lu_solve((symbolic, numeric), Side::Given, &mut rhs[..count * size], count, memory);
+            T::lu_solve((symbolic, numeric), &mut rhs[..count * size], count, memory);
         }
         scale(rhs, columns);
         Ok(())

@@ -1,6 +1,7 @@
 //! L D Lᵀ of matrices whose dofs form chains, here called strings.
 
 use super::cholesky::negligible;
+use super::selection::Selection;
 use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::kernels::chain::Chains;
@@ -113,93 +114,11 @@ fn strings(pattern: SymbolicSparseColMatRef<'_, usize>, last: &[usize]) -> Optio
     (order.len() == n).then_some(Strings { order, begins })
 }
 
-/// Numbering of the unknowns along the strings in the matrix.
-#[derive(Debug)]
-enum Numbering {
-    /// Runs of consecutive dofs: start of each along the strings, its dofs, and their direction.
-    Runs(Vec<(usize, Range<usize>, Direction)>),
-    List(Vec<usize>),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Direction {
-    Up,
-    Down,
-}
-
-/// Average length of runs from which runs are faster than a list.
-const RUN: usize = 8;
-
-impl Numbering {
-    fn new(order: Vec<usize>) -> Self {
-        let mut runs: Vec<(usize, Range<usize>, Direction)> = Vec::new();
-        for (place, &dof) in order.iter().enumerate() {
-            match runs.last_mut() {
-                Some((_, dofs, Direction::Up)) if dofs.end == dof => dofs.end += 1,
-                Some((_, dofs, Direction::Down)) if dofs.start == dof + 1 => dofs.start -= 1,
-                Some((_, dofs, direction)) if dofs.len() == 1 && dofs.start == dof + 1 => {
-                    (*dofs, *direction) = (dof..dof + 2, Direction::Down);
-                }
-                _ => runs.push((place, dof..dof + 1, Direction::Up)),
-            }
-        }
-        if RUN * runs.len() <= order.len() { Self::Runs(runs) } else { Self::List(order) }
-    }
-
-    fn gather<T: Copy>(&self, from: &[T], to: &mut [T]) {
-        match self {
-            Self::Runs(runs) => {
-                for (place, dofs, direction) in runs {
-                    let to = &mut to[*place..place + dofs.len()];
-                    match direction {
-                        Direction::Up => to.copy_from_slice(&from[dofs.clone()]),
-                        Direction::Down => {
-                            to.iter_mut().zip(from[dofs.clone()].iter().rev()).for_each(|(to, &from)| *to = from);
-                        }
-                    }
-                }
-            }
-            Self::List(order) => to.iter_mut().zip(order).for_each(|(to, &dof)| *to = from[dof]),
-        }
-    }
-
-    fn scatter<T: Copy>(&self, from: &[T], to: &mut [T]) {
-        match self {
-            Self::Runs(runs) => {
-                for (place, dofs, direction) in runs {
-                    let from = &from[*place..place + dofs.len()];
-                    match direction {
-                        Direction::Up => to[dofs.clone()].copy_from_slice(from),
-                        Direction::Down => {
-                            to[dofs.clone()].iter_mut().rev().zip(from).for_each(|(to, &from)| *to = from);
-                        }
-                    }
-                }
-            }
-            Self::List(order) => from.iter().zip(order).for_each(|(&from, &dof)| to[dof] = from),
-        }
-    }
-
-    /// Calls `call` with every place along the strings and its dof, in that order.
-    fn for_each(&self, mut call: impl FnMut(usize, usize)) {
-        match self {
-            Self::Runs(runs) => {
-                for (place, dofs, direction) in runs {
-                    match direction {
-                        Direction::Up => (*place..).zip(dofs.clone()).for_each(|(place, dof)| call(place, dof)),
-                        Direction::Down => (*place..).zip(dofs.clone().rev()).for_each(|(place, dof)| call(place, dof)),
-                    }
-                }
-            }
-            Self::List(order) => order.iter().enumerate().for_each(|(place, &dof)| call(place, dof)),
-        }
-    }
-}
-
 #[derive(Debug)]
 struct Factor<T> {
     fingerprint: Fingerprint,
-    numbering: Numbering,
+    /// The unknowns along the strings.
+    numbering: Selection,
     /// Start of each string, and start of its contact dofs; the last entry is the number of dofs.
     begins: Vec<[usize; 2]>,
     /// L below the diagonal and 1/D along the strings; zero after each string.
@@ -240,7 +159,7 @@ fn factorization<T: Real>(
     let places = interface.iter().map(place).collect();
     Ok(Box::new(Factor {
         fingerprint: Fingerprint::of(pattern),
-        numbering: Numbering::new(order),
+        numbering: Selection::new(order),
         begins,
         lower: zeros()?,
         inverse: zeros()?,

@@ -1,7 +1,8 @@
-//! Matrices assembled from lists of entries, and checks of lists of dofs.
+//! Matrices assembled from lists of entries, and checks of elements and of lists of dofs.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 
 /// Rejects dofs that the system does not have.
@@ -45,4 +46,26 @@ pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)
         .to_owned()
         .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix", bytes: None })?;
     Ok(SparseColMat::new(pattern, values))
+}
+
+/// Rejects element matrices that do not fit their dofs, are not finite, or not symmetric.
+pub(super) fn check_element<T: Real>(dofs: &[usize], matrix: &[T], size: usize) -> Result<()> {
+    let n = dofs.len();
+    if matrix.len() != n * n {
+        return Err(Error::Dimension { what: "an element's mass matrix", expected: n * n, found: matrix.len() });
+    }
+    check_dofs("an element", dofs, size)?;
+    if let Some(at) = matrix.iter().position(|m| !m.is_finite()) {
+        let (row, column, value) = (dofs[at / n], dofs[at % n], matrix[at].value());
+        return Err(Error::MatrixNotFinite { matrix: "element mass", row, column, value });
+    }
+    let largest = matrix.iter().fold(T::zero(), |largest, m| largest.max(m.abs()));
+    for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        let (value, mirrored) = (matrix[i * n + j], matrix[j * n + i]);
+        if (value - mirrored).abs() > rounding(largest) {
+            let (row, column, value, mirrored) = (dofs[i], dofs[j], value.value(), mirrored.value());
+            return Err(Error::Asymmetric { matrix: "element mass", row, column, value, mirrored });
+        }
+    }
+    Ok(())
 }

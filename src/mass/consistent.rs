@@ -3,11 +3,11 @@
 use super::layers::Layers;
 use super::{Mass, massless};
 use crate::error::{Error, Result};
-use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Sweeps, Vectors};
-use crate::kernels::side_by_side::{LANES, SideVectors};
+use crate::kernels::conjugate_gradients::{Blocks, Iteration, LANES, Outcome, Vectors};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::{far_below_rounding, half_digits};
 use crate::sparse;
 use faer::sparse::SparseColMatRef;
 
@@ -47,11 +47,18 @@ pub(crate) struct ConsistentInverse<T: Real> {
     /// Dofs without response, ascending.
     fixed: Vec<usize>,
     layers: Layers,
-    /// 1/√m of the diagonal, in the order of places, like the vectors below.
-    scaling: Vec<T>,
-    method: Method<T>,
-    /// Zero between calls.
+    /// Forces in the order of places; zero between calls.
     force: Vec<T>,
+    solver: Solver<T>,
+}
+
+/// Solves for forces in the order of places.
+#[derive(Debug)]
+struct Solver<T: Real> {
+    /// The factors that make responses comparable: √m of the diagonal.
+    weights: Vec<T>,
+    method: Method<T>,
+    /// The last response.
     response: Vec<T>,
 }
 
@@ -64,44 +71,39 @@ enum Method<T: Real> {
         /// force and response, and truncate nothing, because each would truncate something else.
         spans_ranks: bool,
     },
-    /// Entries of the scaled M below its diagonal, row by row, and five vectors; five more for several forces once
-    /// needed.
-    Iteration { pointers: Vec<usize>, columns: Vec<u32>, values: Vec<T>, vectors: Vec<T>, lanes: Vec<T> },
+    Iteration(Scaled<T>),
+}
+
+/// M with a scaled diagonal: entries below it, row by row, and 1/√m of the diagonal; memory of the iteration.
+struct Scaled<T> {
+    pointers: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<T>,
+    scaling: Vec<T>,
+    vectors: Vec<T>,
 }
 
 impl<T: Real> std::fmt::Debug for Method<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Factor { .. } => "Factor",
-            Self::Iteration { .. } => "Iteration",
+            Self::Iteration(_) => "Iteration",
         })
     }
 }
 
-/// Iteration limit and tolerance of a trial. If they are not met, a factor is cheaper.
-const TRIAL: (usize, f64) = (64, 1e-8);
+/// Iteration limit of a trial. If it is not met, a factor is cheaper.
+const TRIAL: usize = 64;
 
 /// Iteration limit of a solve to rounding: far more than needed after a successful trial.
 const LIMIT: usize = 1000;
 
-/// Relative size of updates at which an iteration ends. It is far below rounding: in a body a million times as heavy
-/// as the other one the response is smaller, and its own rounding matters.
-fn resolution<T: Real>() -> f64 {
-    1e-3 * T::epsilon().value()
-}
-
 /// Layers of dofs around the forces in which a response is first computed. Beyond this many elements of linear shape
-/// functions no response exceeds [`negligible`].
+/// functions no response exceeds [`far_below_rounding`] of its largest entry.
 const LAYERS: usize = 36;
 
 /// Number of entries per dof in chains.
 const CHAIN: usize = 3;
-
-/// Entries of a response below this share of its largest one, scaled by the square roots of their masses, have no
-/// effect.
-fn negligible<T: Real>() -> T {
-    T::of(1e-3) * T::epsilon()
-}
 
 impl<T: Real> ConsistentInverse<T> {
     /// Forces are expected on the dofs `near`, or anywhere if the list is empty.
@@ -110,21 +112,18 @@ impl<T: Real> ConsistentInverse<T> {
         let fixed = without_response(mass, prescribed);
         let layers = Layers::around(near, mass, &fixed)?;
         let places = layers.order().len();
-        let [force, response] = [(); 2].map(|()| vec![T::zero(); places]);
         let (pointers, columns, mut values) = lower(mass, &layers)?;
-        let mut scaling: Vec<T> =
-            layers.order().iter().map(|&dof| sparse::entry(mass, dof as usize, dof as usize)).collect();
+        let mut scaling = diagonal(mass, &layers);
+        let weights = scaling.iter().map(|m| m.sqrt()).collect();
         let is_chain = 2 * columns.len() + places <= CHAIN * places;
         if !is_chain && T::scale_blocks(1, (&pointers, &columns), &mut values, &mut scaling).is_ok() {
-            let vectors = memory::zeros(places, 5, "the vectors of conjugate gradients")?;
-            let method = Method::Iteration { pointers, columns, values, vectors, lanes: Vec::new() };
-            let mut tried = Self { fixed, layers, scaling, method, force, response };
-            if tried.is_definite() {
-                return Ok(tried);
+            let method = Method::Iteration(Scaled { pointers, columns, values, scaling, vectors: Vec::new() });
+            let mut solver = Solver { weights, method, response: vec![T::zero(); places] };
+            if solver.is_definite() {
+                return Ok(Self { fixed, layers, force: vec![T::zero(); places], solver });
             }
-            return Self::factored(&Automatic, mass, tried.fixed, tried.layers);
         }
-        Self::factored(&Automatic, mass, fixed, layers)
+        Self::factored(&Automatic, mass, fixed, layers, false)
     }
 
     /// The same with a given solver: for bodies spread over ranks, whose rows only that solver has together.
@@ -136,12 +135,7 @@ impl<T: Real> ConsistentInverse<T> {
         // Dofs whose mass is on other ranks seem to have none, and couplings on other ranks are unknown.
         let fixed = prescribed.to_vec();
         let layers = Layers::around(&[], mass, &fixed)?;
-        let mut inverse = Self::factored(solver, mass, fixed, layers)?;
-        inverse.scaling.fill(T::one());
-        if let Method::Factor { spans_ranks, .. } = &mut inverse.method {
-            *spans_ranks = true;
-        }
-        Ok(inverse)
+        Self::factored(solver, mass, fixed, layers, true)
     }
 
     fn factored(
@@ -149,32 +143,16 @@ impl<T: Real> ConsistentInverse<T> {
         mass: SparseColMatRef<'_, usize, T>,
         fixed: Vec<usize>,
         layers: Layers,
+        spans_ranks: bool,
     ) -> Result<Self> {
-        let factor = factor(solver, mass, &fixed)?;
-        let scaling = layers.order().iter().map(|&dof| sparse::entry(mass, dof as usize, dof as usize).sqrt().recip());
-        let (scaling, vector) = (scaling.collect(), vec![T::zero(); mass.ncols()]);
-        let [force, response] = [(); 2].map(|()| vec![T::zero(); layers.order().len()]);
-        Ok(Self {
-            fixed,
-            layers,
-            scaling,
-            method: Method::Factor { factor, vector, spans_ranks: false },
-            force,
-            response,
-        })
-    }
-
-    /// Whether conjugate gradients converge quickly for scattered numbers, so that M is positive definite. As long as
-    /// no negative curvature is found, the part of the right-hand side along a direction of negative curvature grows
-    /// from one residual to the next (the residual polynomial is 1 at zero and has positive roots), and along one of
-    /// zero curvature it stays.
-    fn is_definite(&mut self) -> bool {
-        for (k, (x, &scaling)) in self.response.iter_mut().zip(&self.scaling).enumerate() {
-            *x = T::of(sparse::scattered_signed(k)) / scaling;
-        }
-        let all = self.response.len();
-        let outcome = self.iterate(all, TRIAL.0, TRIAL.1.max(T::epsilon().value().sqrt()));
-        matches!(outcome, Some(Outcome::Converged { .. }))
+        let method = Method::Factor {
+            factor: factor(solver, mass, &fixed)?,
+            vector: vec![T::zero(); mass.ncols()],
+            spans_ranks,
+        };
+        let weights: Vec<T> = diagonal(mass, &layers).iter().map(|m| m.sqrt()).collect();
+        let [force, response] = [(); 2].map(|()| vec![T::zero(); weights.len()]);
+        Ok(Self { fixed, layers, force, solver: Solver { weights, method, response } })
     }
 
     /// Dofs without response, ascending.
@@ -200,106 +178,35 @@ impl<T: Real> ConsistentInverse<T> {
         }
         let end = self.solve()?;
         x.fill(T::zero());
-        for (&dof, &response) in self.layers.order().iter().zip(&self.response[..end]) {
+        for (&dof, &response) in self.layers.order().iter().zip(&self.solver.response[..end]) {
             x[dof as usize] = response;
         }
         Ok(())
     }
 
     /// M⁻¹ f for several f, each given by its forces (dof, f). `keep` receives the number of each f and its response
-    /// in the order of places, without the negligible end.
+    /// in the order of places, without the negligible end; numbers in any order.
     pub(crate) fn respond<F: Iterator<Item = (usize, T)>>(
         &mut self,
         count: usize,
         forces: impl Fn(usize) -> F,
-        mut keep: impl FnMut(usize, &[T]),
+        keep: impl FnMut(usize, &[T]),
     ) -> Result<()> {
-        if let Method::Factor { .. } = self.method {
-            for number in 0..count {
-                self.load(forces(number));
-                let end = self.solve()?;
-                keep(number, &self.response[..end]);
-            }
-            return Ok(());
-        }
-        for first in (0..count).step_by(LANES) {
-            let numbers = first..count.min(first + LANES);
-            let places = numbers.clone().flat_map(&forces).map(|(dof, _)| self.layers.place(dof));
-            let Some(last) = places.filter(|&place| place < self.force.len()).max() else {
-                numbers.for_each(|number| keep(number, &[]));
-                continue;
-            };
-            let ([begin, end], all) = (self.layers.beyond(last, LAYERS), self.layers.connected(last));
-            let outcomes =
-                self.iterate_side_by_side(end, |lane| (first + lane < count).then(|| forces(first + lane)))?;
-            for (lane, number) in numbers.enumerate() {
-                self.refuse(outcomes[lane])?;
-                self.take_lane(lane, end);
-                let mut end = end;
-                if end < all && self.significant(begin..end).is_some() {
-                    self.load(forces(number));
-                    let result = self.iterate_to_rounding(last, all);
-                    self.force[..=last].fill(T::zero());
-                    result?;
-                    end = all;
-                }
-                let end = self.significant(0..end).map_or(0, |place| place + 1);
-                keep(number, &self.response[..end]);
-            }
-        }
-        Ok(())
+        let Self { layers, solver, .. } = self;
+        let placed = |number| forces(number).map(|(dof, force)| (layers.place(dof), force));
+        let places = layers.order().len();
+        solver.respond(layers, count, |number| placed(number).filter(|&(place, _)| place < places), keep)
     }
 
-    /// Solves for the forces of all lanes on the places before `end`.
-    fn iterate_side_by_side<F: Iterator<Item = (usize, T)>>(
-        &mut self,
-        end: usize,
-        forces: impl Fn(usize) -> Option<F>,
-    ) -> Result<[Outcome; LANES]> {
-        let Self { layers, scaling, method, .. } = self;
-        let done = [Outcome::Converged { iterations: 0 }; LANES];
-        let Method::Iteration { pointers, columns, values, lanes, .. } = method else { return Ok(done) };
-        memory::grow(lanes, lanes.len().max(5 * LANES * end), 1, "the vectors of conjugate gradients")?;
-        let mut parts = lanes.as_chunks_mut::<LANES>().0.chunks_exact_mut(end.max(1));
-        let mut next = || parts.next().unwrap_or_default();
-        let vectors = SideVectors { x: next(), r: next(), p: next(), t: next(), y: next() };
-        vectors.r.fill([T::zero(); LANES]);
-        for lane in 0..LANES {
-            for (dof, force) in forces(lane).into_iter().flatten() {
-                let place = layers.place(dof);
-                if let Some(r) = vectors.r.get_mut(place) {
-                    r[lane] += force * scaling[place];
-                }
-            }
-        }
-        let lower = Blocks { pointers: &pointers[..=end], columns, values };
-        Ok(T::conjugate_gradients_side_by_side(&lower, (resolution::<T>(), LIMIT), vectors))
-    }
-
-    /// Copies the solution of a lane to the response.
-    fn take_lane(&mut self, lane: usize, end: usize) {
-        if let Method::Iteration { lanes, .. } = &self.method {
-            let solution = &lanes.as_chunks::<LANES>().0[..end];
-            for ((response, x), &scaling) in self.response.iter_mut().zip(solution).zip(&self.scaling) {
-                *response = x[lane] * scaling;
-            }
-        }
-    }
-
-    /// Adds forces (dof, f) to the present ones.
-    fn load(&mut self, forces: impl Iterator<Item = (usize, T)>) {
+    /// `x += M⁻¹ f`.
+    pub(crate) fn add_response(&mut self, forces: impl Iterator<Item = (usize, T)>, x: &mut [T]) -> Result<()> {
         for (dof, force) in forces {
             if let Some(own) = self.force.get_mut(self.layers.place(dof)) {
                 *own += force;
             }
         }
-    }
-
-    /// `x += M⁻¹ f`.
-    pub(crate) fn add_response(&mut self, forces: impl Iterator<Item = (usize, T)>, x: &mut [T]) -> Result<()> {
-        self.load(forces);
         let end = self.solve()?;
-        for (&dof, &response) in self.layers.order().iter().zip(&self.response[..end]) {
+        for (&dof, &response) in self.layers.order().iter().zip(&self.solver.response[..end]) {
             x[dof as usize] += response;
         }
         Ok(())
@@ -319,85 +226,150 @@ impl<T: Real> ConsistentInverse<T> {
         }
     }
 
-    /// Converts the force to a response; returns the end of the places that are not negligible.
+    /// Solves for the force, which becomes zero; returns the end of the places where the response is not negligible.
     fn solve(&mut self) -> Result<usize> {
-        if let Method::Factor { spans_ranks: true, .. } = self.method {
-            let result = self.force.len().checked_sub(1).map_or(Ok(0), |last| self.respond_around(last));
-            self.force.fill(T::zero());
-            return result;
-        }
-        let Some(last) = self.force.iter().rposition(|&force| force != T::zero()) else { return Ok(0) };
-        let result = self.respond_around(last);
-        self.force[..=last].fill(T::zero());
-        let end = result?;
-        Ok(self.significant(0..end).map_or(0, |place| place + 1))
+        let Self { layers, force, solver, .. } = self;
+        let acting = || force.iter().copied().enumerate().filter(|(_, force)| *force != T::zero());
+        let mut end = 0;
+        let result = solver.respond(layers, 1, |_| acting(), |_, response| end = response.len());
+        force.fill(T::zero());
+        result.map(|()| end)
+    }
+}
+
+impl<T: Real> Solver<T> {
+    /// Whether conjugate gradients converge quickly for scattered numbers, so that M is positive definite. As long as
+    /// no negative curvature is found, the part of the right-hand side along a direction of negative curvature grows
+    /// from one residual to the next (the residual polynomial is 1 at zero and has positive roots), and along one of
+    /// zero curvature it stays.
+    fn is_definite(&mut self) -> bool {
+        let Self { weights, method: Method::Iteration(scaled), .. } = self else { return false };
+        let scattered = || weights.iter().enumerate().map(|(k, &m)| (k, T::of(sparse::scattered_signed(k)) * m));
+        let tolerance = half_digits::<T>().value();
+        let outcomes = scaled.iterate(weights.len(), TRIAL, tolerance, |lane| (lane == 0).then(scattered));
+        matches!(outcomes, Ok([Outcome::Converged { .. }, ..]))
     }
 
-    /// Computes the response to forces up to a place; returns its end.
-    fn respond_around(&mut self, last: usize) -> Result<usize> {
-        let all = self.layers.connected(last);
-        if let Method::Factor { factor, vector, .. } = &mut self.method {
-            vector.fill(T::zero());
-            for (&dof, &force) in self.layers.order().iter().zip(&self.force[..=last]) {
-                vector[dof as usize] = force;
+    /// As [`ConsistentInverse::respond`], with forces by places; the last response stays in `response`.
+    fn respond<F: Iterator<Item = (usize, T)>>(
+        &mut self,
+        layers: &Layers,
+        count: usize,
+        forces: impl Fn(usize) -> F,
+        mut keep: impl FnMut(usize, &[T]),
+    ) -> Result<()> {
+        for first in (0..count).step_by(LANES) {
+            let lanes = count.min(first + LANES) - first;
+            let last = (first..first + lanes).flat_map(&forces).map(|(place, _)| place).max();
+            if let Method::Factor { factor, vector, spans_ranks } = &mut self.method {
+                let end = last.map_or(0, |last| layers.connected(last));
+                let end = if *spans_ranks { layers.order().len() } else { end };
+                for number in first..first + lanes {
+                    vector.fill(T::zero());
+                    forces(number).for_each(|(place, force)| vector[layers.order()[place] as usize] += force);
+                    factor.solve(vector)?;
+                    for (response, &dof) in self.response[..end].iter_mut().zip(layers.order()) {
+                        *response = vector[dof as usize];
+                    }
+                    let end = if *spans_ranks { end } else { cut(&self.weights, &self.response[..end]) };
+                    keep(number, &self.response[..end]);
+                }
+                continue;
             }
-            factor.solve(vector)?;
-            for (response, &dof) in self.response[..all].iter_mut().zip(self.layers.order()) {
-                *response = vector[dof as usize];
+            let Some(last) = last else {
+                (first..first + lanes).for_each(|number| keep(number, &[]));
+                continue;
+            };
+            // If responses decay more slowly than in linear elements, more layers are needed.
+            let ([begin, end], all) = (layers.beyond(last, LAYERS), layers.connected(last));
+            let mut left: [bool; LANES] = std::array::from_fn(|lane| lane < lanes);
+            for end in [end, all] {
+                self.iterate(layers, end, |lane| left[lane].then(|| forces(first + lane)))?;
+                for (lane, left) in left.iter_mut().enumerate().filter(|(_, left)| **left) {
+                    self.take(lane, end);
+                    let kept = cut(&self.weights, &self.response[..end]);
+                    *left = end < all && kept > begin;
+                    if !*left {
+                        keep(first + lane, &self.response[..kept]);
+                    }
+                }
+                if left == [false; LANES] {
+                    break;
+                }
             }
-            return Ok(all);
         }
-        let [begin, end] = self.layers.beyond(last, LAYERS);
-        self.iterate_to_rounding(last, end)?;
-        // If responses decay more slowly than in linear elements, more layers may be needed.
-        if end == all || self.significant(begin..end).is_none() {
-            return Ok(end);
-        }
-        self.iterate_to_rounding(last, all)?;
-        Ok(all)
+        Ok(())
     }
 
-    /// The last place of a range where the response is not negligible.
-    fn significant(&self, range: std::ops::Range<usize>) -> Option<usize> {
-        let weighted = |place: usize| (self.response[place] / self.scaling[place]).abs();
-        let largest = (0..range.end).map(weighted).fold(T::zero(), T::max);
-        let bound = negligible::<T>() * largest;
-        // NaN is not negligible.
-        range.rev().find(|&place| weighted(place) > bound || self.response[place].is_nan())
-    }
-
-    fn iterate_to_rounding(&mut self, last: usize, end: usize) -> Result<()> {
-        self.response[..=last].copy_from_slice(&self.force[..=last]);
-        self.response[last + 1..end].fill(T::zero());
-        self.iterate(end, LIMIT, 0.0).map_or(Ok(()), |outcome| self.refuse(outcome))
-    }
-
-    /// The error of an iteration that failed.
-    fn refuse(&self, outcome: Outcome) -> Result<()> {
-        match outcome {
-            Outcome::Indefinite { dof, .. } => {
-                Err(Error::Singular { matrix: "mass matrix", dof: self.layers.order()[dof] as usize })
+    /// Solves to rounding for the forces of all lanes on the places before `end`.
+    fn iterate<F: Iterator<Item = (usize, T)>>(
+        &mut self,
+        layers: &Layers,
+        end: usize,
+        forces: impl Fn(usize) -> Option<F>,
+    ) -> Result<()> {
+        let Method::Iteration(scaled) = &mut self.method else { return Ok(()) };
+        for outcome in scaled.iterate(end, LIMIT, 0.0, forces)? {
+            match outcome {
+                Outcome::Indefinite { dof, .. } => {
+                    return Err(Error::Singular { matrix: "mass matrix", dof: layers.order()[dof] as usize });
+                }
+                Outcome::NotConverged { iterations, residual } => {
+                    let (method, tolerance) = ("conjugate gradients for the mass matrix", T::epsilon().value());
+                    return Err(Error::LinearNotConverged { method, iterations, residual, tolerance });
+                }
+                Outcome::Converged { .. } => {}
             }
-            Outcome::NotConverged { iterations, residual } => {
-                let (method, tolerance) = ("conjugate gradients for the mass matrix", T::epsilon().value());
-                Err(Error::LinearNotConverged { method, iterations, residual, tolerance })
-            }
-            Outcome::Converged { .. } => Ok(()),
         }
+        Ok(())
     }
 
-    /// Conjugate gradients on the places before `end`, from right-hand side to solution; `None` if a factor is used.
-    fn iterate(&mut self, end: usize, limit: usize, tolerance: f64) -> Option<Outcome> {
-        let Method::Iteration { pointers, columns, values, vectors, .. } = &mut self.method else { return None };
+    /// Copies the solution of a lane to the response.
+    fn take(&mut self, lane: usize, end: usize) {
+        if let Method::Iteration(scaled) = &self.method {
+            let solution = &scaled.vectors.as_chunks::<LANES>().0[..end];
+            self.response.iter_mut().zip(solution).for_each(|(response, x)| *response = x[lane]);
+        }
+    }
+}
+
+impl<T: Real> Scaled<T> {
+    /// Solves for the forces of all lanes on the places before `end`.
+    fn iterate<F: Iterator<Item = (usize, T)>>(
+        &mut self,
+        end: usize,
+        limit: usize,
+        tolerance: f64,
+        forces: impl Fn(usize) -> Option<F>,
+    ) -> Result<[Outcome; LANES]> {
+        let Self { pointers, columns, values, scaling, vectors } = self;
+        let size = vectors.len().max(5 * LANES * end);
+        memory::grow(vectors, size, 1, "the vectors of conjugate gradients")?;
+        let vectors = Vectors::of(vectors, end);
+        vectors.r.fill([T::zero(); LANES]);
+        for lane in 0..LANES {
+            for (place, force) in forces(lane).into_iter().flatten() {
+                vectors.r[place][lane] += force;
+            }
+        }
         let lower = Blocks { pointers: &pointers[..=end], columns, values };
-        let scaling = &self.scaling[..end];
-        let resolution = resolution::<T>();
-        let iteration = Iteration { lower, scaling, sweeps: Sweeps::GaussSeidel, tolerance, resolution, limit };
-        let mut parts = vectors.chunks_exact_mut(self.response.len().max(1));
-        let mut next = || parts.next().map_or(&mut [][..], |part| &mut part[..end]);
-        let vectors = Vectors { x: next(), r: next(), p: next(), t: next(), q: next() };
-        Some(T::conjugate_gradients(1, &iteration, &mut self.response[..end], vectors))
+        let resolution = far_below_rounding::<T>().value();
+        let iteration = Iteration { lower, scaling, tolerance, resolution, limit };
+        Ok(T::conjugate_gradients_side_by_side(&iteration, vectors))
     }
+}
+
+/// The end of the places where a response is not negligible compared with its largest entry.
+fn cut<T: Real>(weights: &[T], response: &[T]) -> usize {
+    let weighted = || response.iter().zip(weights).map(|(&x, &weight)| (x * weight).abs());
+    let bound = far_below_rounding::<T>() * weighted().fold(T::zero(), T::max);
+    // NaN is not negligible.
+    weighted().rposition(|x| x > bound || x.is_nan()).map_or(0, |place| place + 1)
+}
+
+/// The diagonal of M in the order of places.
+fn diagonal<T: Real>(mass: SparseColMatRef<'_, usize, T>, layers: &Layers) -> Vec<T> {
+    layers.order().iter().map(|&dof| sparse::entry(mass, dof as usize, dof as usize)).collect()
 }
 
 /// The nonzero entries of M below the diagonal, row by row in the order of places.
@@ -471,7 +443,7 @@ mod tests {
             let dofs = mass.ncols();
             let near = [0, 1, 2, 3];
             let mut inverse = ConsistentInverse::new(mass.as_ref(), &[9], &near).unwrap();
-            assert!(matches!(inverse.method, Method::Iteration { .. }));
+            assert!(matches!(inverse.solver.method, Method::Iteration(_)));
             assert_eq!((inverse.near(), inverse.place(9) > dofs), (4, true));
             let chosen = [2, 0, 1, 3, 1];
             let found = responses(&mut inverse, &chosen);
@@ -514,7 +486,7 @@ mod tests {
         let chain = SparseColMat::try_new_from_triplets(50, 50, &chain).unwrap();
         for mass in [chain, rod(60, 0.499_99)] {
             let mut inverse = ConsistentInverse::new(mass.as_ref(), &[], &[1]).unwrap();
-            assert!(matches!(inverse.method, Method::Factor { .. }));
+            assert!(matches!(inverse.solver.method, Method::Factor { .. }));
             let mut left = vec![0.0; mass.ncols()];
             Mass::Consistent(mass.as_ref()).add_product(1.0, &responses(&mut inverse, &[1])[0], &mut left);
             left[1] -= 1.0;
@@ -532,7 +504,7 @@ mod tests {
         let mass = rod(20, 0.25);
         let mut inverse = ConsistentInverse::new(mass.as_ref(), &[], &[0]).unwrap();
         // A matrix that no trial accepts.
-        if let Method::Iteration { values, .. } = &mut inverse.method {
+        if let Method::Iteration(Scaled { values, .. }) = &mut inverse.solver.method {
             for x in values.iter_mut() {
                 *x *= 3.0;
             }

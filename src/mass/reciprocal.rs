@@ -1,6 +1,6 @@
 //! Reciprocal mass matrices: a sparse M⁻¹ assembled from the elements.
 
-use super::assembly::{assembled, check_dofs};
+use super::assembly::{assembled, check_element};
 use super::lump::check_positive;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
@@ -99,26 +99,4 @@ fn of_element(error: Error, dofs: &[usize]) -> Error {
         Error::Mass { dof, value } => Error::Mass { dof: dofs[dof], value },
         other => other,
     }
-}
-
-/// Rejects element matrices that do not fit their dofs, are not finite, or not symmetric.
-fn check_element<T: Real>(dofs: &[usize], matrix: &[T], size: usize) -> Result<()> {
-    let n = dofs.len();
-    if matrix.len() != n * n {
-        return Err(Error::Dimension { what: "an element's mass matrix", expected: n * n, found: matrix.len() });
-    }
-    check_dofs("an element", dofs, size)?;
-    if let Some(at) = matrix.iter().position(|m| !m.is_finite()) {
-        let (row, column, value) = (dofs[at / n], dofs[at % n], matrix[at].value());
-        return Err(Error::MatrixNotFinite { matrix: "element mass", row, column, value });
-    }
-    let largest = matrix.iter().fold(T::zero(), |largest, m| largest.max(m.abs()));
-    for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))) {
-        let (value, mirrored) = (matrix[i * n + j], matrix[j * n + i]);
-        if (value - mirrored).abs() > T::of(256.0) * T::epsilon() * largest {
-            let (row, column, value, mirrored) = (dofs[i], dofs[j], value.value(), mirrored.value());
-            return Err(Error::Asymmetric { matrix: "element mass", row, column, value, mirrored });
-        }
-    }
-    Ok(())
 }

@@ -4,7 +4,9 @@ use super::assembly::{assembled, check_dofs, flags};
 use super::inverse::check_definite;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::sparse;
+use crate::sparse::check_vector;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeMap;
 
@@ -106,7 +108,7 @@ pub fn redistribute<T: Real>(
     for (dof, &m) in loss.mass.iter().enumerate() {
         if loss.massless[dof] { &mut loss.lost } else { &mut loss.kept }.push((dof, dof, m));
     }
-    let change = loss.returned(by, T::epsilon().value())?;
+    let change = loss.compensation(by, rounding(T::one()).value())?;
     let redistributed: Vec<T> = loss.diagonal(&change);
     loss.check(&redistributed)?;
     Ok(redistributed)
@@ -166,7 +168,7 @@ pub fn redistribute_consistent<T: Real>(
             }
         }
     }
-    let change = loss.returned(by, T::epsilon().value())?;
+    let change = loss.compensation(by, rounding(T::one()).value())?;
     let diagonal: Vec<T> = loss.diagonal(&change);
     loss.check(&diagonal)?;
     let keeps = |dof: &usize| !loss.massless[*dof];
@@ -223,9 +225,7 @@ pub fn affine_motions<T: Real, const D: usize>(
         return Err(Error::Dimension { what, expected: coordinates.len(), found: dofs.len() });
     }
     let values = coordinates.as_flattened();
-    if let Some(index) = values.iter().position(|x| !x.is_finite()) {
-        return Err(Error::NotFinite { what: "coordinates of the nodes", index, value: values[index].value() });
-    }
+    check_vector("coordinates of the nodes", values, values.len())?;
     check_dofs("the dofs of the nodes", dofs.as_flattened(), size)?;
     let mut motions = vec![vec![0.0; size]; D + 1];
     for axis in 0..D {
@@ -289,8 +289,8 @@ impl<'a> Loss<'a> {
         }
     }
 
-    /// The change that returns the lost mass; `epsilon` is the rounding unit of the input scalar.
-    fn returned(&self, by: Redistribution<'_>, epsilon: f64) -> Result<Change> {
+    /// The change that returns the lost mass; `rounding` is the relative rounding of sums of the input.
+    fn compensation(&self, by: Redistribution<'_>, rounding: f64) -> Result<Change> {
         let n = self.mass.len();
         // A row that keeps mass gets lost couplings back on its diagonal; the row sum of a massless dof goes to other
         // dofs.
@@ -305,7 +305,7 @@ impl<'a> Loss<'a> {
                 for dof in (0..n).filter(|&dof| given[dof] != 0.0) {
                     let neighbors = || self.neighbors(graph, dof);
                     let total: f64 = neighbors().map(|other| self.mass[other]).sum();
-                    check_takers(dof, total)?;
+                    check_receivers(dof, total)?;
                     neighbors().for_each(|other| change.added[other] += given[dof] * self.mass[other] / total);
                 }
             }
@@ -332,8 +332,8 @@ impl<'a> Loss<'a> {
                 check_motions(motions, n)?;
                 let listed = receivers.map(|list| flags("the list of receivers", list, n)).transpose()?;
                 for group in self.by_group(|dof| listed.as_ref().is_none_or(|listed| listed[dof])) {
-                    check_takers(group.massless[0], group.receivers.len() as f64)?;
-                    self.least_squares(&group, motions, epsilon, &mut change)?;
+                    check_receivers(group.massless[0], group.receivers.len() as f64)?;
+                    self.least_squares(&group, motions, rounding, &mut change)?;
                 }
             }
         }
@@ -355,20 +355,20 @@ impl<'a> Loss<'a> {
         for group in self.by_group(|_| true) {
             let kept = group.kept.iter().map(|entry| entry.2).sum::<f64>();
             let total = kept + group.receivers.iter().map(|&dof| change.added[dof]).sum::<f64>();
-            check_takers(group.massless[0], total)?;
+            check_receivers(group.massless[0], total)?;
             let sum: f64 = group.massless.iter().map(|&dof| given[dof]).sum();
             group.receivers.iter().for_each(|&dof| change.density[dof] = sum / total);
         }
         Ok(())
     }
 
-    /// The groups that lose mass, with their dofs that keep mass and may `take` more.
-    fn by_group(&self, take: impl Fn(usize) -> bool) -> Vec<Group> {
+    /// The groups that lose mass, with their dofs that keep mass and may receive more.
+    fn by_group(&self, receives: impl Fn(usize) -> bool) -> Vec<Group> {
         let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
         for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| self.massless[*dof]) {
             groups.entry(*group).or_default().massless.push(dof);
         }
-        for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| !self.massless[*dof] && take(*dof)) {
+        for (dof, group) in self.groups.iter().enumerate().filter(|(dof, _)| !self.massless[*dof] && receives(*dof)) {
             if let Some(group) = groups.get_mut(group) {
                 group.receivers.push(dof);
             }
@@ -392,8 +392,7 @@ impl<'a> Loss<'a> {
     /// weights mᵢ the functions aᵢ/mᵢ are orthonormalized one by one (Gram and Schmidt, twice), and the b are
     /// transformed in the same way; then p = Σ b aᵢ/mᵢ. Unlike the normal equations this loses no digits if
     /// coordinates start far away.
-    fn least_squares(&self, group: &Group, motions: &[Vec<f64>], epsilon: f64, change: &mut Change) -> Result<()> {
-        let tolerance = 1e3 * epsilon;
+    fn least_squares(&self, group: &Group, motions: &[Vec<f64>], rounding: f64, change: &mut Change) -> Result<()> {
         let mass: Vec<f64> = group.receivers.iter().map(|&dof| self.mass[dof]).collect();
         let dot = |x: &[f64], y: &[f64]| -> f64 { mass.iter().zip(x.iter().zip(y)).map(|(m, (x, y))| m * x * y).sum() };
         let momentum = |motion: &Vec<f64>| {
@@ -425,12 +424,12 @@ impl<'a> Loss<'a> {
                     }
                 }
                 let rest = dot(&function, &function).sqrt();
-                if rest > tolerance * norm {
+                if rest > rounding * norm {
                     for x in &mut function {
                         *x /= rest;
                     }
                     basis.push((function, loss / rest));
-                } else if loss.abs() > tolerance * size {
+                } else if loss.abs() > rounding * size {
                     return Err(refused(
                         group.massless[0],
                         "the dofs that may take it cannot keep these motions; let more of them, or keep fewer motions",
@@ -471,7 +470,7 @@ fn refused(dof: usize, reason: &'static str) -> Error {
 }
 
 /// Fails if no dof may receive the mass of a dof; `weight` is the mass of the receivers, or their number.
-fn check_takers(dof: usize, weight: f64) -> Result<()> {
+fn check_receivers(dof: usize, weight: f64) -> Result<()> {
     match weight > 0.0 {
         true => Ok(()),
         false => Err(refused(dof, "no dof of its group that keeps mass may take it")),
@@ -487,12 +486,7 @@ fn check_motions(motions: &[Vec<f64>], size: usize) -> Result<()> {
         });
     }
     for motion in motions {
-        if motion.len() != size {
-            return Err(Error::Dimension { what, expected: size, found: motion.len() });
-        }
-        if let Some(index) = motion.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NotFinite { what, index, value: motion[index] });
-        }
+        check_vector(what, motion, size)?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Singular mass matrices: assembled so that contact dofs have no mass.
 
-use super::assembly::{assembled, check_dofs, flags};
+use super::assembly::{assembled, check_element, flags};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::sparse;
@@ -54,14 +54,8 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
     for (number, (dofs, matrix)) in elements.into_iter().enumerate() {
         let (dofs, matrix) = (dofs.as_ref(), matrix.as_ref());
         let n = dofs.len();
-        if matrix.len() != n * n {
-            return Err(Error::Dimension { what: "an element's mass matrix", expected: n * n, found: matrix.len() });
-        }
-        check_dofs("an element", dofs, size)?;
+        check_element(dofs, matrix, size)?;
         let all = || (0..n * n).map(|k| (dofs[k / n], dofs[k % n], matrix[k]));
-        if let Some((row, column, m)) = all().find(|(_, _, m)| !m.is_finite()) {
-            return Err(Error::MatrixNotFinite { matrix: "element mass", row, column, value: m.value() });
-        }
         // Total of each group, and total of its dofs that keep mass.
         let mut sums: BTreeMap<usize, [T; 2]> = BTreeMap::new();
         if dofs.iter().any(|&dof| massless[dof]) {
@@ -90,7 +84,6 @@ pub fn singular<T: Real, I: AsRef<[usize]>, M: AsRef<[T]>>(
         }));
     }
     let mass = assembled(size, entries)?;
-    sparse::check_symmetric("mass", mass.as_ref())?;
     for dof in (0..size).filter(|&dof| !massless[dof]) {
         let m = sparse::entry(mass.as_ref(), dof, dof);
         if m <= T::zero() {

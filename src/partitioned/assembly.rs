@@ -1,11 +1,13 @@
 //! Any number of bodies, coupled by rows over their interface dofs.
 
 use super::coupling::Coupling;
-use super::problem::{Problem, check_finite, check_flexibility, check_length, rounding};
+use super::problem::{Problem, check_flexibility, check_length};
 use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::rounding;
+use crate::sparse::check_vector;
 
 const FLEXIBILITY: &str = "flexibility of a body";
 
@@ -253,15 +255,14 @@ impl<T: Real> Assembly<T> {
     /// # Errors
     ///
     /// The errors of [`new`](Self::new), also for a body that does not exist; the assembly is then unchanged.
-    pub fn set_flexibility(&mut self, body: usize, flexibility: &[T]) -> Result<()> {
+    pub fn set_flexibility(&mut self, number: usize, flexibility: &[T]) -> Result<()> {
         let count = self.bodies.len();
-        let Some(body) = self.bodies.get_mut(body) else {
-            let part = format!("a flexibility of body {body} of {count}");
+        let Some(body) = self.bodies.get(number) else {
+            let part = format!("a flexibility of body {number} of {count}");
             return Err(Error::Incompatible { part, reason: "bodies are counted from zero" });
         };
         check_flexibility(FLEXIBILITY, flexibility, body.dofs)?;
-        body.flexibility.copy_from_slice(flexibility);
-        self.formed = false;
+        self.update_flexibility(number, flexibility);
         Ok(())
     }
 
@@ -292,25 +293,33 @@ impl<T: Real> Assembly<T> {
         self.run(free, gaps, Some(held))
     }
 
-    fn run(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) -> Result<&Assembled<T>> {
+    /// Replaces a checked flexibility; W is kept if it is the same.
+    pub(super) fn update_flexibility(&mut self, body: usize, flexibility: &[T]) {
+        let own = &mut self.bodies[body].flexibility;
+        if own != flexibility {
+            own.copy_from_slice(flexibility);
+            self.formed = false;
+        }
+    }
+
+    /// [`solve`](Self::solve), or [`hold`](Self::hold) for some rows.
+    pub(super) fn run(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) -> Result<&Assembled<T>> {
         let rows = self.rows();
-        check_length("gaps of an assembly", gaps.len(), rows)?;
+        check_vector("gaps of an assembly", gaps, rows)?;
         check_length("the list of rows held", held.map_or(rows, <[bool]>::len), rows)?;
         check_length("the list of free values", free.len(), self.bodies.len())?;
-        check_finite("gaps of an assembly", gaps)?;
         for (body, free) in self.bodies.iter().zip(free) {
-            check_length("free values of a body", free.len(), body.dofs)?;
-            check_finite("free values of a body", free)?;
+            check_vector("free values of a body", free, body.dofs)?;
         }
         self.choose(held);
         if !self.formed {
             self.form();
         }
         self.measure(free, gaps);
-        self.set_out(held.is_some());
+        self.set_up(held.is_some());
         self.assembled.multipliers.fill(T::zero());
         self.assembled.iterations = self.problem.solve()?;
-        self.answer(free, gaps, held);
+        self.apply_multipliers(free, gaps, held);
         Ok(&self.assembled)
     }
 
@@ -371,7 +380,7 @@ impl<T: Real> Assembly<T> {
     }
 
     /// Sets up the contact problem, starting from the multipliers of the previous call.
-    fn set_out(&mut self, hold: bool) {
+    fn set_up(&mut self, hold: bool) {
         let Self { problem, equalities, offsets, roundings, assembled, .. } = self;
         let Problem { rows, multipliers, offset, tolerance, sets, .. } = problem;
         offset.clear();
@@ -388,7 +397,7 @@ impl<T: Real> Assembly<T> {
     }
 
     /// Computes the effect of the multipliers on the bodies.
-    fn answer(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) {
+    fn apply_multipliers(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) {
         let Assembled { multipliers, gaps: open, closed, forces, values, .. } = &mut self.assembled;
         for (&row, &multiplier) in self.problem.rows.iter().zip(&self.problem.multipliers) {
             multipliers[row] = multiplier;

@@ -1,9 +1,13 @@
 //! A frame between two sides whose nodes match, with localized Lagrange multipliers.
 
-use super::problem::{Problem, check_finite, check_flexibility, check_length, rounding};
-use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver};
+use super::assembly::Assembly;
+use super::coupling::Coupling;
+use super::problem::{check_flexibility, check_length};
+use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::error::Result;
+use crate::memory;
 use crate::real::Real;
+use crate::sparse::check_vector;
 
 /// The interface of a body: its values without contact, and its flexibility.
 ///
@@ -124,7 +128,8 @@ impl<T: Real> Interface<T> {
 /// ```
 #[derive(Debug)]
 pub struct Frame<T: Real> {
-    problem: Problem<T>,
+    /// Both sides as bodies, with a row for each node.
+    assembly: Assembly<T>,
     interface: Interface<T>,
 }
 
@@ -145,7 +150,10 @@ impl<T: Real> Frame<T> {
     ///
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory) if the dense problem does not fit.
     pub fn with_solver(nodes: usize, solver: impl ContactSolver<T> + 'static) -> Result<Self> {
-        let problem = Problem::new(nodes, Box::new(solver), "a frame")?;
+        let rigid: Vec<T> = memory::zeros(nodes, nodes, "a frame")?;
+        let row = |node| Coupling::unilateral(&[(0, node, -T::one()), (1, node, T::one())]);
+        let rows: Vec<_> = (0..nodes).map(row).collect();
+        let assembly = Assembly::with_solver(&[&rigid, &rigid], &rows, solver)?;
         let zero = || vec![T::zero(); nodes];
         let interface = Interface {
             forces: zero(),
@@ -155,7 +163,7 @@ impl<T: Real> Frame<T> {
             closed: vec![false; nodes],
             iterations: 0,
         };
-        Ok(Self { problem, interface })
+        Ok(Self { assembly, interface })
     }
 
     /// Contact: forces that press, on nodes whose gap would close. `gaps` are the gaps at zero values of both sides,
@@ -187,65 +195,30 @@ impl<T: Real> Frame<T> {
 
     fn run(&mut self, sides: [Side<'_, T>; 2], gaps: &[T], held: Option<&[bool]>) -> Result<&Interface<T>> {
         let n = self.interface.forces.len();
-        check_length("gaps of the frame", gaps.len(), n)?;
+        check_vector("gaps of the frame", gaps, n)?;
         check_length("the list of nodes held", held.map_or(n, <[bool]>::len), n)?;
-        check_finite("gaps of the frame", gaps)?;
-        sides.iter().try_for_each(|side| check(side, n))?;
-        let Self { problem, interface } = self;
-        let Interface { forces, positions, values, gaps: open, closed, iterations } = interface;
-        let [first, second] = &sides;
-        let Problem { rows: nodes, multipliers, delassus, version, offset, tolerance, sets, .. } = problem;
-        nodes.clear();
-        nodes.extend((0..n).filter(|&node| held.is_none_or(|held| held[node])));
-        // Each W gets a version number, so that the solver can keep its factor while W is unchanged.
-        let size = nodes.len();
-        let mut changed = delassus.len() != size * size;
-        delassus.resize(size * size, T::zero());
-        let places = nodes.iter().flat_map(|&j| nodes.iter().map(move |&i| i + j * n));
-        for (w, at) in delassus.iter_mut().zip(places) {
-            let value = first.flexibility[at] + second.flexibility[at];
-            changed |= *w != value;
-            *w = value;
+        for side in &sides {
+            check_vector("free values of a side", side.free, n)?;
+            check_flexibility("flexibility of a side", side.flexibility, n)?;
         }
-        *version += u64::from(changed);
-        let of_gap = |node: usize| rounding(first.free[node].abs() + second.free[node].abs() + gaps[node].abs());
-        offset.clear();
-        offset.extend(nodes.iter().map(|&node| second.free[node] - first.free[node] + gaps[node]));
-        tolerance.clear();
-        tolerance.extend(nodes.iter().map(|&node| of_gap(node)));
-        sets.clear();
-        sets.resize(size, if held.is_some() { AdmissibleSet::Free } else { AdmissibleSet::NonNegative });
-        multipliers.clear();
-        multipliers.extend(nodes.iter().map(|&node| forces[node]));
-        forces.fill(T::zero());
-        *iterations = problem.solve()?;
-
-        for (&node, &multiplier) in problem.rows.iter().zip(&problem.multipliers) {
-            forces[node] = multiplier;
+        let Self { assembly, interface } = self;
+        for (body, side) in sides.iter().enumerate() {
+            assembly.update_flexibility(body, side.flexibility);
         }
-        for ((values, side), sign) in values.iter_mut().zip(&sides).zip([-T::one(), T::one()]) {
-            values.copy_from_slice(side.free);
-            for (column, &force) in side.flexibility.chunks_exact(n.max(1)).zip(&*forces) {
-                T::axpy(sign * force, column, values);
-            }
+        let found = assembly.run(&sides.map(|side| side.free), gaps, held)?;
+        interface.forces.copy_from_slice(found.multipliers());
+        interface.gaps.copy_from_slice(found.gaps());
+        interface.closed.copy_from_slice(found.closed());
+        interface.iterations = found.iterations();
+        for (body, values) in interface.values.iter_mut().enumerate() {
+            values.copy_from_slice(found.values(body));
         }
-        for node in 0..n {
-            let [first, second] = [values[0][node], values[1][node] + gaps[node]];
-            open[node] = second - first;
-            positions[node] = T::of(0.5) * (first + second);
-            closed[node] = match held {
-                Some(held) => held[node],
-                None => forces[node] > T::zero() || open[node] <= of_gap(node),
-            };
+        let [first, second] = &interface.values;
+        for (position, ((&first, &second), &gap)) in
+            interface.positions.iter_mut().zip(first.iter().zip(second).zip(gaps))
+        {
+            *position = T::of(0.5) * (first + second + gap);
         }
         Ok(interface)
     }
-}
-
-/// Rejects sides of wrong sizes, and invalid flexibilities.
-fn check<T: Real>(side: &Side<'_, T>, n: usize) -> Result<()> {
-    let Side { free, flexibility } = side;
-    check_length("free values of a side", free.len(), n)?;
-    check_finite("free values of a side", free)?;
-    check_flexibility("flexibility of a side", flexibility, n)
 }

@@ -1,9 +1,11 @@
-//! Shared parts of frames: the contact problem of the selected rows, its solver and memory, and checks of host data.
+//! The contact problem of the selected rows, its solver and memory, and checks of host data.
 
 use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::half_digits;
+use crate::sparse::check_vector;
 
 /// The contact problem of selected rows.
 #[derive(Debug)]
@@ -48,11 +50,6 @@ impl<T: Real> Problem<T> {
     }
 }
 
-/// The rounding of a sum of terms of this magnitude.
-pub(super) fn rounding<T: Real>(size: T) -> T {
-    T::of(64.0) * T::epsilon() * size
-}
-
 /// The failure in the numbering of the frame.
 fn of_frame<T: Real>(failure: ContactFailure<T>, rows: &[usize]) -> ContactFailure<f64> {
     match failure {
@@ -77,18 +74,10 @@ pub(super) fn check_length(what: &'static str, found: usize, expected: usize) ->
     if found == expected { Ok(()) } else { Err(Error::Dimension { what, expected, found }) }
 }
 
-pub(super) fn check_finite<T: Real>(what: &'static str, x: &[T]) -> Result<()> {
-    match x.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NotFinite { what, index, value: x[index].value() }),
-        None => Ok(()),
-    }
-}
-
 /// Rejects flexibilities whose number of dofs is not n, with a negative diagonal entry, or that are not symmetric
 /// (columns may have been stored as rows, or solved for with other normals).
 pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], n: usize) -> Result<()> {
-    check_length(what, flexibility.len(), n * n)?;
-    check_finite(what, flexibility)?;
+    check_vector(what, flexibility, n * n)?;
     let entry = |i: usize, j: usize| flexibility[i + j * n];
     for column in 0..n {
         if entry(column, column) < T::zero() {
@@ -98,7 +87,7 @@ pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], 
             // Columns are results of solves, whose error depends on the condition of the body's matrix.
             let scale = entry(row, row).max(entry(column, column));
             let (value, mirrored) = (entry(row, column), entry(column, row));
-            if (value - mirrored).abs() > T::epsilon().sqrt() * scale {
+            if (value - mirrored).abs() > half_digits::<T>() * scale {
                 let (value, mirrored) = (value.value(), mirrored.value());
                 return Err(Error::Asymmetric { matrix: "flexibility", row, column, value, mirrored });
             }

@@ -1,40 +1,53 @@
-//! A reduced body: its matrices over (η, u_b), and the maps from fields of the parent and back.
+//! A reduced body, and the maps from fields of the parent to (η, u_b) and back.
 
-use super::builder::{Accuracy, Boundary};
 use crate::error::{Error, Result};
-use crate::kernels::dense::{add_product, transposed_product};
 use crate::kernels::vector::Accumulate;
-use crate::mass::assembled;
-use crate::memory;
-use crate::real::{Kernels, Real};
+use crate::real::Real;
 use crate::system::LinearSystem;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 use std::ops::Range;
 
-/// The data of a reduced body.
-pub(super) struct Parts<'a, T: Real> {
-    pub(super) contact: Vec<usize>,
-    pub(super) fixed: Vec<usize>,
-    pub(super) boundary: Boundary,
-    pub(super) frequencies: Vec<f64>,
-    pub(super) rigid: usize,
-    pub(super) sigma: Vec<f64>,
-    /// Φ and S on all dofs of the parent, column by column.
-    pub(super) shapes: Vec<f64>,
-    pub(super) fields: Vec<f64>,
-    /// F⁻¹; empty if contact dofs have mass.
-    pub(super) weights: Vec<f64>,
-    pub(super) accuracy: Accuracy,
-    /// Coefficients of the modes; empty without damping.
-    pub(super) damping: Vec<f64>,
-    /// Rayleigh's coefficients, for contact dofs with mass.
-    pub(super) rayleigh: Option<[f64; 2]>,
-    pub(super) load: Option<Vec<T>>,
-    /// The static response to the load that modes and contact dofs do not contain; empty without load.
-    pub(super) rest: Vec<f64>,
-    pub(super) mass: SparseColMatRef<'a, usize, T>,
-    pub(super) stiffness: SparseColMatRef<'a, usize, T>,
-    pub(super) factorizations: usize,
+/// The interface between modes and contact dofs.
+///
+/// `docs/reduction.md` measures all variants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Boundary {
+    /// Massless contact dofs on the residual flexibility, with the modes tapered toward the highest: the contact
+    /// force is smooth. Statically slightly softer than the body; see [`Accuracy`]. For parents with a regular mass
+    /// matrix. It is too soft if contact dofs of the parent are already massless, or if contacts are small and grow
+    /// slowly.
+    #[default]
+    Tapered,
+    /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
+    /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
+    /// exact. Known failure: the abrupt end of the modes makes the contact force ring, after a front by 0.8 of it. It
+    /// does not ring if contacts grow slowly, as Hertz's do, or if contact dofs of the parent have no mass and there
+    /// are many times more modes than contact dofs.
+    Untapered,
+    /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6,
+    /// 1968). Statically exact; contact dofs have mass. Known failure: at an impact that mass makes the force ring
+    /// and jump, as with any scheme on dofs with mass; use a corrector.
+    CraigBampton,
+}
+
+/// Distance of a reduced body from its parent, as far as the build can determine it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Accuracy {
+    /// The share of the static compliance at a contact dof, without rigid motion, that the modes do not contain: the
+    /// largest over all contact dofs. `None` for [`Boundary::CraigBampton`], whose modes do not move the contact
+    /// dofs.
+    pub residual: Option<f64>,
+    /// Relative excess of that compliance over the parent's: [`Reduction::softening`] times the residual if tapered,
+    /// otherwise zero.
+    pub compliance: f64,
+    /// The first circular frequency not in the modes (1/time). The force of a contact of duration T is resolved to
+    /// times of about 1/ω: observed mean errors were about 2/(ω T) for bodies that touch at a point.
+    pub cutoff: f64,
+    /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω. With longer steps the observed
+    /// overshoot of the force behind a front grew, due to the step and not to the modes. Infinite for a rigid body.
+    pub longest_step: f64,
 }
 
 /// A body reduced to normal modes η and contact dofs u_b, built by [`Reduction`](super::Reduction).
@@ -49,30 +62,44 @@ pub(super) struct Parts<'a, T: Real> {
 /// of rest. Elastic vibrations are tapered once in recovery and once in excitation.
 #[derive(Clone, Debug)]
 pub struct ReducedBody<T: Real> {
-    parent: usize,
-    contact: Vec<usize>,
-    fixed: Vec<usize>,
+    pub(super) parent: Parent<T>,
     pub(super) boundary: Boundary,
-    frequencies: Vec<f64>,
-    rigid: usize,
+    pub(super) frequencies: Vec<f64>,
+    pub(super) rigid: usize,
     /// σ_k.
-    sigma: Vec<T>,
-    shapes: Vec<T>,
-    fields: Vec<T>,
-    /// F⁻¹ row by row, P by contact dof.
+    pub(super) sigma: Vec<T>,
+    /// Φ and S on all dofs of the parent, column by column.
+    pub(super) shapes: Vec<T>,
+    pub(super) fields: Vec<T>,
+    /// F⁻¹ row by row, empty if contact dofs have mass; P by contact dof.
     pub(super) weights: Vec<T>,
     pub(super) coupling: Vec<T>,
-    mass: SparseColMat<usize, T>,
-    stiffness: SparseColMat<usize, T>,
-    damping: Option<SparseColMat<usize, T>>,
-    load: Option<Vec<T>>,
-    rest: Vec<T>,
-    parent_mass: SparseColMat<usize, T>,
-    parent_load: Option<Vec<T>>,
-    /// The parent's column of K for each fixed dof.
-    at_supports: Vec<Vec<(usize, T)>>,
-    accuracy: Accuracy,
-    factorizations: usize,
+    pub(super) matrices: Matrices<T>,
+    pub(super) accuracy: Accuracy,
+    pub(super) factorizations: usize,
+}
+
+/// The body that was reduced.
+#[derive(Clone, Debug)]
+pub(super) struct Parent<T: Real> {
+    pub(super) dofs: usize,
+    pub(super) contact: Vec<usize>,
+    pub(super) fixed: Vec<usize>,
+    pub(super) mass: SparseColMat<usize, T>,
+    /// The column of K for each fixed dof.
+    pub(super) at_supports: Vec<Vec<(usize, T)>>,
+    pub(super) load: Option<Vec<T>>,
+    /// The static response to the load that modes and contact dofs do not contain; empty without load.
+    pub(super) rest: Vec<T>,
+}
+
+/// The matrices and the load over the reduced dofs.
+#[derive(Clone, Debug)]
+pub(super) struct Matrices<T: Real> {
+    pub(super) mass: SparseColMat<usize, T>,
+    pub(super) stiffness: SparseColMat<usize, T>,
+    pub(super) damping: Option<SparseColMat<usize, T>>,
+    pub(super) load: Option<Vec<T>>,
 }
 
 fn check<T>(what: &'static str, x: &[T], expected: usize) -> Result<()> {
@@ -82,98 +109,15 @@ fn check<T>(what: &'static str, x: &[T], expected: usize) -> Result<()> {
     }
 }
 
-/// A dense symmetric matrix under construction.
-struct Dense {
-    size: usize,
-    values: Vec<f64>,
-}
-
-impl Dense {
-    fn new(size: usize) -> Result<Self> {
-        Ok(Self { size, values: memory::zeros(size, size, "the matrices of a reduced body")? })
-    }
-
-    fn set(&mut self, i: usize, j: usize, value: f64) {
-        self.values[i * self.size + j] = value;
-        self.values[j * self.size + i] = value;
-    }
-
-    /// Converts to sparse without zero entries.
-    fn sparse<T: Real>(&self) -> Result<SparseColMat<usize, T>> {
-        let size = self.size;
-        let entries = self.values.iter().enumerate().filter(|(_, value)| **value != 0.0);
-        assembled(size, entries.map(|(k, &value)| (k % size, k / size, T::of(value))).collect())
-    }
-}
-
-fn scalars<T: Real>(values: &[f64]) -> Vec<T> {
-    values.iter().map(|&x| T::of(x)).collect()
-}
-
-fn owned<T: Real>(a: SparseColMatRef<'_, usize, T>) -> Result<SparseColMat<usize, T>> {
-    let pattern =
-        a.symbolic().to_owned().map_err(|_| Error::OutOfMemory { what: "the mass of the parent", bytes: None })?;
-    Ok(SparseColMat::new(pattern, a.val().to_vec()))
-}
-
 impl<T: Real> ReducedBody<T> {
-    pub(super) fn assemble(parts: Parts<'_, T>) -> Result<Self> {
-        let parent = parts.stiffness.nrows();
-        let (count, contacts) = (parts.frequencies.len(), parts.contact.len());
-        let held = parts.boundary == Boundary::CraigBampton;
-        // P, one row per contact dof.
-        let mut coupling = vec![0.0; contacts * count];
-        if !held {
-            for (row, &dof) in coupling.chunks_exact_mut(count).zip(&parts.contact) {
-                for (k, p) in row.iter_mut().enumerate() {
-                    *p = parts.sigma[k] * parts.shapes[k * parent + dof];
-                }
-            }
-        }
-        let [mass, stiffness] = if held { with_mass(&parts)? } else { massless(&parts, &coupling)? };
-        let damping = if parts.damping.is_empty() { None } else { Some(damping(&parts, [&mass, &stiffness])?) };
-        let column = |&dof: &usize| {
-            let k = parts.stiffness;
-            k.row_idx_of_col_raw(dof).iter().copied().zip(k.val_of_col(dof).iter().copied()).collect()
-        };
-        let mut body = Self {
-            parent,
-            at_supports: parts.fixed.iter().map(column).collect(),
-            contact: parts.contact,
-            fixed: parts.fixed,
-            boundary: parts.boundary,
-            frequencies: parts.frequencies,
-            rigid: parts.rigid,
-            sigma: scalars(&parts.sigma),
-            shapes: scalars(&parts.shapes),
-            fields: scalars(&parts.fields),
-            weights: scalars(&parts.weights),
-            coupling: scalars(&coupling),
-            mass: mass.sparse()?,
-            stiffness: stiffness.sparse()?,
-            damping,
-            load: None,
-            rest: scalars(&parts.rest),
-            parent_mass: owned(parts.mass)?,
-            parent_load: None,
-            accuracy: parts.accuracy,
-            factorizations: parts.factorizations,
-        };
-        if let Some(load) = parts.load {
-            body.load = Some(body.load(&load)?);
-            body.parent_load = Some(load);
-        }
-        Ok(body)
-    }
-
     /// Number of dofs: modes and contact dofs.
     pub fn dofs(&self) -> usize {
-        self.frequencies.len() + self.contact.len()
+        self.frequencies.len() + self.parent.contact.len()
     }
 
     /// Number of dofs of the parent, including supports.
     pub fn parent_dofs(&self) -> usize {
-        self.parent
+        self.parent.dofs
     }
 
     /// Range of the contact dofs, in the order in which they were given.
@@ -203,22 +147,22 @@ impl<T: Real> ReducedBody<T> {
 
     /// The mass matrix: diag(I, 0), or the one of Craig and Bampton.
     pub fn mass(&self) -> SparseColMatRef<'_, usize, T> {
-        self.mass.as_ref()
+        self.matrices.mass.as_ref()
     }
 
     /// The stiffness matrix.
     pub fn stiffness(&self) -> SparseColMatRef<'_, usize, T> {
-        self.stiffness.as_ref()
+        self.matrices.stiffness.as_ref()
     }
 
     /// The damping matrix, if there is damping.
     pub fn damping(&self) -> Option<SparseColMatRef<'_, usize, T>> {
-        self.damping.as_ref().map(SparseColMat::as_ref)
+        self.matrices.damping.as_ref().map(SparseColMat::as_ref)
     }
 
     /// The reduced constant load, if there is one.
     pub fn constant_load(&self) -> Option<&[T]> {
-        self.load.as_deref()
+        self.matrices.load.as_deref()
     }
 
     /// The system of this body alone.
@@ -227,12 +171,12 @@ impl<T: Real> ReducedBody<T> {
     ///
     /// The errors of [`LinearSystem::new`].
     pub fn system(&self) -> Result<LinearSystem<'static, T>> {
-        let system = LinearSystem::new(self.mass.clone(), self.stiffness.clone())?;
-        let system = match &self.damping {
+        let system = LinearSystem::new(self.matrices.mass.clone(), self.matrices.stiffness.clone())?;
+        let system = match &self.matrices.damping {
             Some(damping) => system.damping(damping.clone())?,
             None => system,
         };
-        Ok(match self.load.clone() {
+        Ok(match self.matrices.load.clone() {
             Some(load) => system.load(move |_, out| out.copy_from_slice(&load)),
             None => system,
         })
@@ -244,12 +188,12 @@ impl<T: Real> ReducedBody<T> {
     ///
     /// [`Error::Dimension`].
     pub fn load(&self, load: &[T]) -> Result<Vec<T>> {
-        check("a load on the parent of a reduced body", load, self.parent)?;
+        check("a load on the parent of a reduced body", load, self.parent.dofs)?;
         let count = self.frequencies.len();
         let mut out = self.along(&self.shapes, load);
         let moved = self.along(&self.fields, load);
         // For Craig and Bampton the fields are responses to displacements.
-        let forces = self.weigh(&moved);
+        let forces = self.contact_forces(&moved);
         for (x, &sigma) in out.iter_mut().zip(&self.sigma) {
             *x *= sigma;
         }
@@ -268,7 +212,7 @@ impl<T: Real> ReducedBody<T> {
     ///
     /// [`Error::Dimension`].
     pub fn displacement(&self, u: &[T]) -> Result<Vec<T>> {
-        check("a displacement of the parent of a reduced body", u, self.parent)?;
+        check("a displacement of the parent of a reduced body", u, self.parent.dofs)?;
         Ok(self.project(u))
     }
 
@@ -278,18 +222,18 @@ impl<T: Real> ReducedBody<T> {
     ///
     /// [`Error::Dimension`].
     pub fn velocity(&self, v: &[T]) -> Result<Vec<T>> {
-        check("a velocity of the parent of a reduced body", v, self.parent)?;
+        check("a velocity of the parent of a reduced body", v, self.parent.dofs)?;
         Ok(self.project(v))
     }
 
     fn project(&self, u: &[T]) -> Vec<T> {
-        let at_contact: Vec<T> = self.contact.iter().map(|&dof| u[dof]).collect();
+        let at_contact: Vec<T> = self.parent.contact.iter().map(|&dof| u[dof]).collect();
         let mut modal = u.to_vec();
         if self.boundary == Boundary::CraigBampton {
-            self.fields.chunks_exact(self.parent).zip(&at_contact).for_each(|(f, &x)| T::axpy(-x, f, &mut modal));
+            self.fields.chunks_exact(self.parent.dofs).zip(&at_contact).for_each(|(f, &x)| T::axpy(-x, f, &mut modal));
         }
-        let mut momentum = vec![T::zero(); self.parent];
-        T::symmetric_product(T::one(), self.parent_mass.as_ref(), &modal, &mut momentum, Accumulate::Replace);
+        let mut momentum = vec![T::zero(); self.parent.dofs];
+        T::symmetric_product(T::one(), self.parent.mass.as_ref(), &modal, &mut momentum, Accumulate::Replace);
         let mut out = self.along(&self.shapes, &momentum);
         for (x, &sigma) in out.iter_mut().zip(&self.sigma) {
             *x *= sigma;
@@ -305,8 +249,8 @@ impl<T: Real> ReducedBody<T> {
     /// [`Error::Dimension`].
     pub fn recover_displacement(&self, u: &[T]) -> Result<Vec<T>> {
         let mut field = self.recover(u)?;
-        if !self.rest.is_empty() {
-            T::axpy(T::one(), &self.rest, &mut field);
+        if !self.parent.rest.is_empty() {
+            T::axpy(T::one(), &self.parent.rest, &mut field);
             self.set_contact(u, &mut field);
         }
         Ok(field)
@@ -329,12 +273,12 @@ impl<T: Real> ReducedBody<T> {
             let moved = self.coupling.chunks_exact(modal.len()).map(|row| crate::dense::dot(row, modal));
             apart.iter_mut().zip(moved).for_each(|(u, moved)| *u -= moved);
         }
-        let forces = self.weigh(&apart);
-        let mut field = vec![T::zero(); self.parent];
-        for ((shape, &x), &sigma) in self.shapes.chunks_exact(self.parent).zip(modal).zip(&self.sigma) {
+        let forces = self.contact_forces(&apart);
+        let mut field = vec![T::zero(); self.parent.dofs];
+        for ((shape, &x), &sigma) in self.shapes.chunks_exact(self.parent.dofs).zip(modal).zip(&self.sigma) {
             T::axpy(sigma * x, shape, &mut field);
         }
-        for (shape, &force) in self.fields.chunks_exact(self.parent).zip(&forces) {
+        for (shape, &force) in self.fields.chunks_exact(self.parent.dofs).zip(&forces) {
             T::axpy(force, shape, &mut field);
         }
         self.set_contact(x, &mut field);
@@ -343,7 +287,7 @@ impl<T: Real> ReducedBody<T> {
 
     /// Sets the contact dofs exactly, which recovery reproduces only to rounding.
     fn set_contact(&self, x: &[T], field: &mut [T]) {
-        self.contact.iter().zip(&x[self.frequencies.len()..]).for_each(|(&dof, &u)| field[dof] = u);
+        self.parent.contact.iter().zip(&x[self.frequencies.len()..]).for_each(|(&dof, &u)| field[dof] = u);
     }
 
     /// The forces of the supports on the body, one for each fixed dof in the order in which they were given, from
@@ -354,101 +298,26 @@ impl<T: Real> ReducedBody<T> {
     /// [`Error::Dimension`].
     pub fn support_forces(&self, u: &[T], a: &[T]) -> Result<Vec<T>> {
         let (u, a) = (self.recover_displacement(u)?, self.recover(a)?);
-        let mut inertia = vec![T::zero(); self.parent];
-        T::symmetric_product(T::one(), self.parent_mass.as_ref(), &a, &mut inertia, Accumulate::Replace);
+        let mut inertia = vec![T::zero(); self.parent.dofs];
+        T::symmetric_product(T::one(), self.parent.mass.as_ref(), &a, &mut inertia, Accumulate::Replace);
         let force = |(&dof, column): (&usize, &Vec<(usize, T)>)| {
             let elastic: T = column.iter().map(|&(row, k)| k * u[row]).sum();
-            let load = self.parent_load.as_ref().map_or(T::zero(), |load| load[dof]);
+            let load = self.parent.load.as_ref().map_or(T::zero(), |load| load[dof]);
             inertia[dof] + elastic - load
         };
-        Ok(self.fixed.iter().zip(&self.at_supports).map(force).collect())
+        Ok(self.parent.fixed.iter().zip(&self.parent.at_supports).map(force).collect())
     }
 
     /// Products of columns on the dofs of the parent with a vector there.
     fn along(&self, columns: &[T], x: &[T]) -> Vec<T> {
-        columns.chunks_exact(self.parent).map(|column| crate::dense::dot(column, x)).collect()
+        columns.chunks_exact(self.parent.dofs).map(|column| crate::dense::dot(column, x)).collect()
     }
 
     /// F⁻¹ x; x itself if contact dofs have mass.
-    fn weigh(&self, x: &[T]) -> Vec<T> {
+    fn contact_forces(&self, x: &[T]) -> Vec<T> {
         match self.weights.is_empty() {
             true => x.to_vec(),
             false => self.weights.chunks_exact(x.len()).map(|row| crate::dense::dot(row, x)).collect(),
         }
     }
-}
-
-/// M = diag(I, 0) and K = [Ω² + PᵀF⁻¹P, −PᵀF⁻¹; −F⁻¹P, F⁻¹].
-fn massless<T: Real>(parts: &Parts<'_, T>, coupling: &[f64]) -> Result<[Dense; 2]> {
-    let (count, contacts) = (parts.frequencies.len(), parts.contact.len());
-    let (mut mass, mut stiffness) = (Dense::new(count + contacts)?, Dense::new(count + contacts)?);
-    // Rows of P are columns of Pᵀ (modes × contact dofs); the same holds for W P.
-    let mut weighed = vec![0.0; count * contacts];
-    add_product(1.0, count, coupling, &parts.weights, &mut weighed);
-    let mut pulled = vec![0.0; count * count];
-    let transposed =
-        |a: &[f64]| -> Vec<f64> { (0..count * contacts).map(|k| a[k % contacts * count + k / contacts]).collect() };
-    transposed_product(contacts, &transposed(coupling), &transposed(&weighed), &mut pulled);
-    for i in 0..count {
-        mass.set(i, i, 1.0);
-        for j in 0..=i {
-            let own = if i == j { parts.frequencies[i].powi(2) } else { 0.0 };
-            stiffness.set(i, j, own + 0.5 * (pulled[i * count + j] + pulled[j * count + i]));
-        }
-        for contact in 0..contacts {
-            stiffness.set(i, count + contact, -weighed[contact * count + i]);
-        }
-    }
-    for i in 0..contacts {
-        for j in 0..=i {
-            stiffness.set(count + i, count + j, parts.weights[i * contacts + j]);
-        }
-    }
-    Ok([mass, stiffness])
-}
-
-/// M and K projected onto the modes with held contact dofs and the static responses to these dofs.
-fn with_mass<T: Real>(parts: &Parts<'_, T>) -> Result<[Dense; 2]> {
-    let (count, contacts, n) = (parts.frequencies.len(), parts.contact.len(), parts.stiffness.nrows());
-    let (mut mass, mut stiffness) = (Dense::new(count + contacts)?, Dense::new(count + contacts)?);
-    let project = |a: SparseColMatRef<'_, usize, T>, onto: &[f64]| -> Result<Vec<f64>> {
-        let all: Vec<usize> = (0..n).collect();
-        let a = super::pencil::part(a, &all, &all)?;
-        let mut products = vec![0.0; parts.fields.len()];
-        for (x, y) in parts.fields.chunks_exact(n).zip(products.chunks_exact_mut(n)) {
-            f64::symmetric_product(1.0, a.as_ref(), x, y, Accumulate::Replace);
-        }
-        let mut out = vec![0.0; onto.len() / n * contacts];
-        transposed_product(n, onto, &products, &mut out);
-        Ok(out)
-    };
-    let (beside, own) = (project(parts.mass, &parts.shapes)?, project(parts.mass, &parts.fields)?);
-    let elastic = project(parts.stiffness, &parts.fields)?;
-    for i in 0..count {
-        mass.set(i, i, 1.0);
-        stiffness.set(i, i, parts.frequencies[i].powi(2));
-        for contact in 0..contacts {
-            mass.set(i, count + contact, beside[contact * count + i]);
-        }
-    }
-    for i in 0..contacts {
-        for j in 0..=i {
-            let mean = |a: &[f64]| 0.5 * (a[i * contacts + j] + a[j * contacts + i]);
-            mass.set(count + i, count + j, mean(&own));
-            stiffness.set(count + i, count + j, mean(&elastic));
-        }
-    }
-    Ok([mass, stiffness])
-}
-
-/// C: the modal damping, or Rayleigh damping of all dofs if contact dofs have mass.
-fn damping<T: Real>(parts: &Parts<'_, T>, [mass, stiffness]: [&Dense; 2]) -> Result<SparseColMat<usize, T>> {
-    let mut matrix = Dense::new(mass.size)?;
-    if let (Boundary::CraigBampton, Some([of_mass, of_stiffness])) = (parts.boundary, parts.rayleigh) {
-        let entries = mass.values.iter().zip(&stiffness.values);
-        matrix.values.iter_mut().zip(entries).for_each(|(c, (m, k))| *c = of_mass * m + of_stiffness * k);
-    } else {
-        parts.damping.iter().enumerate().for_each(|(k, &c)| matrix.set(k, k, c));
-    }
-    matrix.sparse()
 }

@@ -1,6 +1,7 @@
 //! Builder of a reduced body: supports, contact dofs, residual flexibility, damping, constant loads.
 
-use super::body::{Parts, ReducedBody};
+use super::body::{Accuracy, Boundary, Matrices, Parent, ReducedBody};
+use super::matrices;
 use super::modes::{Modes, Wanted};
 use super::pencil::{self, Pencil};
 use super::residual::response;
@@ -9,50 +10,8 @@ use crate::error::{Error, Result};
 use crate::kernels::dense::{add_product, transposed_product};
 use crate::real::Real;
 use crate::sparse;
-use faer::sparse::SparseColMatRef;
-
-/// The interface between modes and contact dofs.
-///
-/// `docs/reduction.md` measures all variants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Boundary {
-    /// Massless contact dofs on the residual flexibility, with the modes tapered toward the highest: the contact
-    /// force is smooth. Statically slightly softer than the body; see [`Accuracy`]. For parents with a regular mass
-    /// matrix. It is too soft if contact dofs of the parent are already massless, or if contacts are small and grow
-    /// slowly.
-    #[default]
-    Tapered,
-    /// Massless contact dofs on the residual flexibility (MacNeal, Comput. Struct. 1, 1971, without the second-order
-    /// term of Rubin, AIAA J. 13, 1975; with contact: Monjaraz-Tec, Gross, Krack, Nonlinear Dyn. 2022). Statically
-    /// exact. Known failure: the abrupt end of the modes makes the contact force ring, after a front by 0.8 of it. It
-    /// does not ring if contacts grow slowly, as Hertz's do, or if contact dofs of the parent have no mass and there
-    /// are many times more modes than contact dofs.
-    Untapered,
-    /// Modes of the body with its contact dofs held, and static responses to them (Craig and Bampton, AIAA J. 6,
-    /// 1968). Statically exact; contact dofs have mass. Known failure: at an impact that mass makes the force ring
-    /// and jump, as with any scheme on dofs with mass; use a corrector.
-    CraigBampton,
-}
-
-/// Distance of a reduced body from its parent, as far as the build can determine it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Accuracy {
-    /// The share of the static compliance at a contact dof, without rigid motion, that the modes do not contain: the
-    /// largest over all contact dofs. `None` for [`Boundary::CraigBampton`], whose modes do not move the contact
-    /// dofs.
-    pub residual: Option<f64>,
-    /// Relative excess of that compliance over the parent's: [`Reduction::softening`] times the residual if tapered,
-    /// otherwise zero.
-    pub compliance: f64,
-    /// The first circular frequency not in the modes (1/time). The force of a contact of duration T is resolved to
-    /// times of about 1/ω: observed mean errors were about 2/(ω T) for bodies that touch at a point.
-    pub cutoff: f64,
-    /// The longest step of a scheme that resolves the modes up to the cutoff, 2.5/ω. With longer steps the observed
-    /// overshoot of the force behind a front grew, due to the step and not to the modes. Infinite for a rigid body.
-    pub longest_step: f64,
-}
+use crate::sparse::check_vector;
+use faer::sparse::{SparseColMat, SparseColMatRef};
 
 /// Largest ω h at which steps resolve a mode.
 const RESOLVED: f64 = 2.5;
@@ -279,34 +238,62 @@ impl<'a, T: Real> Reduction<'a, T> {
             Boundary::CraigBampton => self.held(&mut pencil, &modes)?,
             Boundary::Tapered | Boundary::Untapered => self.massless(&mut pencil, &modes)?,
         };
-        let damping = self.modal_damping(&modes)?;
         let rest = self.rest(&mut pencil, &modes, &interface)?;
+        let held = self.boundary == Boundary::CraigBampton;
         let (shapes, mut fields) = (pencil.expand(&modes.shapes), pencil.expand(&interface.fields));
-        if self.boundary == Boundary::CraigBampton {
+        // P, one row per contact dof.
+        let mut coupling = Vec::new();
+        if held {
             self.contact.iter().enumerate().for_each(|(k, &dof)| fields[k * dofs + dof] = 1.0);
+        } else {
+            let column =
+                |dof: usize| interface.sigma.iter().zip(shapes.chunks_exact(dofs)).map(move |(s, f)| s * f[dof]);
+            coupling.extend(self.contact.iter().flat_map(|&dof| column(dof)));
         }
-        ReducedBody::assemble(Parts {
+        let frequencies = modes.frequencies.clone();
+        let [mass, stiffness] = match held {
+            true => matrices::with_mass([self.mass, self.stiffness], &frequencies, [&shapes, &fields])?,
+            false => matrices::massless(&frequencies, &coupling, &interface.stiffness)?,
+        };
+        let modal = self.modal_damping(&modes)?;
+        let rayleigh = match self.damping {
+            Damping::Rayleigh(coefficients) if held => Some(coefficients),
+            _ => None,
+        };
+        let damping = match modal.is_empty() {
+            true => None,
+            false => Some(matrices::damping(&modal, rayleigh, [&mass, &stiffness])?.sparse()?),
+        };
+        let at_support = |&dof: &usize| {
+            let k = self.stiffness;
+            k.row_idx_of_col_raw(dof).iter().copied().zip(k.val_of_col(dof).iter().copied()).collect()
+        };
+        let no_memory = |_| Error::OutOfMemory { what: "the mass of the parent", bytes: None };
+        let parent = Parent {
+            dofs,
             contact: self.contact.clone(),
             fixed: self.fixed.clone(),
-            boundary: self.boundary,
-            frequencies: modes.frequencies.clone(),
-            rigid: modes.rigid(),
-            sigma: interface.sigma,
-            shapes,
-            fields,
-            weights: interface.stiffness,
-            accuracy: interface.accuracy,
-            damping,
-            rayleigh: match self.damping {
-                Damping::Rayleigh(coefficients) => Some(coefficients),
-                Damping::None | Damping::Ratio(_) => None,
-            },
+            mass: SparseColMat::new(self.mass.symbolic().to_owned().map_err(no_memory)?, self.mass.val().to_vec()),
+            at_supports: self.fixed.iter().map(at_support).collect(),
             load: self.load.clone(),
-            rest: pencil.expand(&rest),
-            mass: self.mass,
-            stiffness: self.stiffness,
+            rest: scalars(&pencil.expand(&rest)),
+        };
+        let mut body = ReducedBody {
+            parent,
+            boundary: self.boundary,
+            frequencies,
+            rigid: modes.rigid(),
+            sigma: scalars(&interface.sigma),
+            shapes: scalars(&shapes),
+            fields: scalars(&fields),
+            weights: scalars(&interface.stiffness),
+            coupling: scalars(&coupling),
+            matrices: Matrices { mass: mass.sparse()?, stiffness: stiffness.sparse()?, damping, load: None },
+            accuracy: interface.accuracy,
             factorizations: pencil.factorizations,
-        })
+        };
+        body.matrices.load = self.load.as_ref().map(|load| body.load(load)).transpose()?;
+        Ok(body)
     }
 
     fn check(&self, dofs: usize, free: &[usize]) -> Result<()> {
@@ -349,14 +336,7 @@ impl<'a, T: Real> Reduction<'a, T> {
             });
         }
         let Some(load) = &self.load else { return Ok(()) };
-        let what = "the constant load of a reduced body";
-        if load.len() != dofs {
-            return Err(Error::Dimension { what, expected: dofs, found: load.len() });
-        }
-        match load.iter().position(|x| !x.is_finite()) {
-            Some(index) => Err(Error::NotFinite { what, index, value: load[index].value() }),
-            None => Ok(()),
-        }
+        check_vector("the constant load of a reduced body", load, dofs)
     }
 
     /// Massless contact dofs on the residual flexibility of the modes.
@@ -477,6 +457,10 @@ impl<'a, T: Real> Reduction<'a, T> {
         add_product(-1.0, n, &interface.fields, &forces, &mut rest);
         Ok(rest)
     }
+}
+
+fn scalars<T: Real>(values: &[f64]) -> Vec<T> {
+    values.iter().map(|&x| T::of(x)).collect()
 }
 
 /// F⁻¹, bitwise symmetric.

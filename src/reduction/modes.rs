@@ -5,13 +5,9 @@ use super::pencil::{self, Pencil};
 use crate::error::{Error, Result};
 use crate::kernels::dense::transposed_product;
 use crate::real::Real;
+use crate::rounding::{DISTINCT, MODE_RESIDUAL};
+use crate::sparse::check_vector;
 use faer::sparse::SparseColMatRef;
-
-/// Relative difference from which eigenvalues count as distinct.
-const APART: f64 = 1e-5;
-
-/// Allowed residual of computed modes.
-const TOLERANCE: f64 = 1e-9;
 
 /// Band width for elastic modes: a narrow band converges with fewer solves.
 const BAND: usize = 4;
@@ -169,10 +165,10 @@ impl Modes {
         let dofs = pencil::check(mass, stiffness)?;
         let free = pencil::free_dofs(dofs, fixed)?;
         check_given(modes, dofs)?;
-        Self::take(&mut Pencil::new(mass, stiffness, free)?, modes)
+        Self::import(&mut Pencil::new(mass, stiffness, free)?, modes)
     }
 
-    fn take(pencil: &mut Pencil, modes: &GivenModes<'_>) -> Result<Self> {
+    fn import(pencil: &mut Pencil, modes: &GivenModes<'_>) -> Result<Self> {
         let count = modes.frequencies.len();
         if count > pencil.rank {
             return Err(too_many(count));
@@ -185,8 +181,7 @@ impl Modes {
         let polished = polish(pencil, given.clone())?;
         // Rigid motions may have been combined with each other, not with elastic modes: the remaining part is an
         // error.
-        let mut products = vec![0.0; given.len()];
-        pencil.mass_product(&given, &mut products);
+        let products = pencil.mass.times(&given);
         let mut rest = given;
         remove(n, &polished, &products, &mut rest);
         for (mode, residual) in lengths(pencil, &rest).into_iter().enumerate() {
@@ -273,9 +268,8 @@ impl Modes {
     /// Modes with their Rayleigh quotients, if their residuals are within tolerance.
     fn checked(pencil: &mut Pencil, shapes: Vec<f64>, rigid: usize, next: Option<f64>) -> Result<Self> {
         let n = pencil.size();
-        check_orthonormal(pencil, &shapes, TOLERANCE)?;
-        let mut products = vec![0.0; shapes.len()];
-        pencil.stiffness_product(&shapes, &mut products);
+        check_orthonormal(pencil, &shapes, MODE_RESIDUAL)?;
+        let products = pencil.stiffness.times(&shapes);
         let quotients: Vec<f64> =
             shapes.chunks_exact(n).zip(products.chunks_exact(n)).map(|(x, f)| pencil.quotient(x, f)).collect();
         if let Some(&value) = quotients.iter().find(|&&quotient| quotient < 0.0) {
@@ -294,7 +288,7 @@ impl Modes {
             factorizations: pencil.factorizations,
             solves: 0,
         };
-        modes.residual = modes.worst_residual(pencil, TOLERANCE)?;
+        modes.residual = modes.worst_residual(pencil, MODE_RESIDUAL)?;
         modes.solves = pencil.solves;
         Ok(modes)
     }
@@ -305,16 +299,14 @@ impl Modes {
         let (rigid, elastic) = self.shapes.split_at(self.rigid * n);
         let (mut worst, mut mode) = (0.0_f64, self.rigid);
         for block in elastic.chunks(8 * n) {
-            let mut rest = vec![0.0; block.len()];
-            pencil.mass_product(block, &mut rest);
+            let mut rest = pencil.mass.times(block);
             pencil.solve(&mut rest)?;
             for (k, (x, y)) in block.chunks_exact(n).zip(rest.chunks_exact_mut(n)).enumerate() {
                 let inverse = self.frequencies[mode + k].powi(2) + pencil.shift;
                 x.iter().zip(y).for_each(|(x, y)| *y = *x - inverse * *y);
             }
             // Rounding in rigid motions is amplified by 1/σ and is no error of the mode.
-            let mut products = vec![0.0; rest.len()];
-            pencil.mass_product(&rest, &mut products);
+            let products = pencil.mass.times(&rest);
             remove(n, rigid, &products, &mut rest);
             for residual in lengths(pencil, &rest) {
                 let blurred = pencil.blur / (self.frequencies[mode].powi(2) + pencil.shift);
@@ -411,7 +403,7 @@ fn cut(values: &[f64], zeros: usize, wanted: Wanted, all: bool) -> Result<Option
         return Err(Error::Empty { what: "the list of modes", remedy: "ask for a higher frequency" });
     }
     let last = value(count - 1);
-    let distinct = (count..found).find(|&k| value(k) > last * (1.0 + APART)).unwrap_or(found);
+    let distinct = (count..found).find(|&k| value(k) > last * (1.0 + DISTINCT)).unwrap_or(found);
     if distinct == found && !all {
         return Ok(None);
     }
@@ -452,15 +444,14 @@ fn converge(pencil: &mut Pencil, lanczos: &mut Lanczos, zeros: usize, wanted: Wa
 /// They are computed first: next to their eigenvalue 1/σ the eigenvalues of elastic modes would be lost in rounding.
 fn rigid_motions(pencil: &mut Pencil) -> Result<(Vec<f64>, Lanczos)> {
     let n = pencil.size();
-    let block = (6 * pencil.bodies + 2).clamp(8, 64).min(pencil.rank);
+    let block = (6 * pencil.bodies() + 2).clamp(8, 64).min(pencil.rank);
     let mut lanczos = Lanczos::new(n, block, Vec::new());
     loop {
         lanczos.advance(pencil)?;
         let Some(pairs) = lanczos.pairs(pencil.shift) else { continue };
         let low = pairs.values.iter().take_while(|&&value| value < 0.5 * pencil.shift).count();
         let vectors = purified(pencil, lanczos.vectors(&pairs, low)?)?;
-        let mut products = vec![0.0; vectors.len()];
-        pencil.stiffness_product(&vectors, &mut products);
+        let products = pencil.stiffness.times(&vectors);
         let is_rigid = |(x, f)| pencil.quotient(x, f) == 0.0;
         let rigid = vectors.chunks_exact(n).zip(products.chunks_exact(n)).take_while(|&pair| is_rigid(pair)).count();
         if rigid == pairs.values.len() && !lanczos.exhausted {
@@ -484,8 +475,7 @@ fn purified(pencil: &mut Pencil, vectors: Vec<f64>) -> Result<Vec<f64>> {
     if pencil.rank == n || vectors.is_empty() {
         return Ok(vectors);
     }
-    let mut pure = vec![0.0; vectors.len()];
-    pencil.mass_product(&vectors, &mut pure);
+    let mut pure = pencil.mass.times(&vectors);
     pencil.solve(&mut pure)?;
     let lengths = lengths(pencil, &pure);
     for (vector, length) in pure.chunks_exact_mut(n).zip(lengths) {
@@ -499,8 +489,7 @@ fn purified(pencil: &mut Pencil, vectors: Vec<f64>) -> Result<Vec<f64>> {
 /// Rigid motions after two steps of inverse iteration, M-orthonormal.
 fn polish(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
     for _ in 0..2 {
-        let mut products = vec![0.0; vectors.len()];
-        pencil.mass_product(&vectors, &mut products);
+        let mut products = pencil.mass.times(&vectors);
         if !products.is_empty() {
             pencil.solve(&mut products)?;
         }
@@ -512,19 +501,18 @@ fn polish(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
 /// Makes vectors M-orthonormal, one by one.
 fn orthonormal(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
     let n = pencil.size();
-    let mut product = vec![0.0; n];
     for k in 0..vectors.len() / n {
         let (done, rest) = vectors.split_at_mut(k * n);
         let vector = &mut rest[..n];
         // Normalize first: rigid motions from a solve have length of order 1/σ.
         for pass in 0..3 {
             if pass > 0 {
-                pencil.mass_product(vector, &mut product);
+                let product = pencil.mass.times(vector);
                 remove(n, done, &product, vector);
             }
             let length = lengths(pencil, vector)[0];
             if !(length > 0.0 && length.is_finite()) {
-                return Err(Error::ModeResidual { mode: k, residual: 1.0, tolerance: TOLERANCE });
+                return Err(Error::ModeResidual { mode: k, residual: 1.0, tolerance: MODE_RESIDUAL });
             }
             for x in vector.iter_mut() {
                 *x /= length;
@@ -537,8 +525,7 @@ fn orthonormal(pencil: &mut Pencil, mut vectors: Vec<f64>) -> Result<Vec<f64>> {
 /// Lengths of vectors in the norm of M.
 fn lengths(pencil: &mut Pencil, vectors: &[f64]) -> Vec<f64> {
     let n = pencil.size();
-    let mut products = vec![0.0; vectors.len()];
-    pencil.mass_product(vectors, &mut products);
+    let products = pencil.mass.times(vectors);
     norms(n, vectors, &products)
 }
 
@@ -553,8 +540,7 @@ fn within(mode: usize, residual: f64, tolerance: f64) -> Result<()> {
 fn check_orthonormal(pencil: &mut Pencil, shapes: &[f64], tolerance: f64) -> Result<()> {
     let n = pencil.size();
     let count = shapes.len() / n;
-    let (mut products, mut gram) = (vec![0.0; shapes.len()], vec![0.0; count * count]);
-    pencil.mass_product(shapes, &mut products);
+    let (products, mut gram) = (pencil.mass.times(shapes), vec![0.0; count * count]);
     transposed_product(n, shapes, &products, &mut gram);
     for (place, value) in gram.into_iter().enumerate() {
         let (row, column) = (place % count, place / count);
@@ -567,8 +553,7 @@ fn check_orthonormal(pencil: &mut Pencil, shapes: &[f64], tolerance: f64) -> Res
 fn check_rigid(pencil: &mut Pencil, modes: &Modes, tolerance: f64) -> Result<()> {
     let n = pencil.size();
     let rigid = &modes.shapes[..modes.rigid * n];
-    let mut products = vec![0.0; rigid.len()];
-    pencil.stiffness_product(rigid, &mut products);
+    let products = pencil.stiffness.times(rigid);
     let scale = modes.frequencies.get(modes.rigid).map_or(pencil.shift, |omega| omega * omega);
     for (mode, (x, f)) in rigid.chunks_exact(n).zip(products.chunks_exact(n)).enumerate() {
         within(mode, (pencil.quotient(x, f) / scale).abs(), tolerance)?;
@@ -581,15 +566,8 @@ fn check_given(modes: &GivenModes<'_>, dofs: usize) -> Result<()> {
     if frequencies.is_empty() {
         return Err(Error::Empty { what: "the list of modes", remedy: "give at least one" });
     }
-    let expected = dofs * frequencies.len();
-    if shapes.len() != expected {
-        return Err(Error::Dimension { what: "the shapes of the modes", expected, found: shapes.len() });
-    }
-    for (what, values) in [("the frequencies of the modes", frequencies), ("the shapes of the modes", shapes)] {
-        if let Some(index) = values.iter().position(|x| !x.is_finite()) {
-            return Err(Error::NotFinite { what, index, value: values[index] });
-        }
-    }
+    check_vector("the frequencies of the modes", frequencies, frequencies.len())?;
+    check_vector("the shapes of the modes", shapes, dofs * frequencies.len())?;
     let last = frequencies[frequencies.len() - 1];
     let ascending = frequencies.windows(2).find(|pair| pair[0] > pair[1]).map(|pair| pair[1]);
     if let Some(value) = ascending.or(Some(frequencies[0]).filter(|&omega| omega < 0.0)) {

@@ -6,32 +6,25 @@
 use crate::error::{Error, Result};
 use crate::kernels::inertia::negative_eigenvalues;
 use crate::linear_solver::ordering::symbolic_cholesky;
-use crate::linear_solver::{Automatic, Factorization, LinearSolver, Ordering};
+use crate::linear_solver::{Automatic, Factorization, LinearSolver, Ordering, components};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::{half_digits, rounding};
 use crate::sparse::{self, Combination, Product, Symmetry};
 use faer::sparse::{SparseColMat, SparseColMatRef, Triplet};
-
-/// The shift σ relative to the median of K_ii/M_ii, the squared frequency of single elements: small compared with all
-/// elastic frequencies except for very long chains, and large compared with the rounding of K.
-const SHIFT: f64 = 1e-8;
-
-/// A motion is rigid if its strain energy is at most this many roundings of its sum of terms.
-const RIGID: f64 = 32.0;
 
 #[derive(Debug)]
 pub(super) struct Pencil {
     /// Dofs of the body, and the free ones among them, ascending.
     pub(super) dofs: usize,
     pub(super) free: Vec<usize>,
-    pub(super) mass: SparseColMat<usize, f64>,
-    pub(super) stiffness: SparseColMat<usize, f64>,
-    by_mass: Product<f64>,
-    by_stiffness: Product<f64>,
+    pub(super) mass: Operator,
+    pub(super) stiffness: Operator,
     /// The pattern of K + σM and K − μM.
     sum: Combination,
     /// Number of free dofs with mass, which is the number of finite eigenvalues.
     pub(super) rank: usize,
+    /// σ, from the median of K_ii/M_ii, the squared frequency of single elements.
     pub(super) shift: f64,
     /// Largest error of an eigenvalue from the rounding of K.
     pub(super) blur: f64,
@@ -40,10 +33,30 @@ pub(super) struct Pencil {
     pub(super) factorizations: usize,
     /// Right-hand sides solved so far.
     pub(super) solves: usize,
-    /// Relative rounding of the entries of K.
-    rounding: f64,
-    /// Number of unconnected parts.
-    pub(super) bodies: usize,
+    /// Relative rounding of sums of entries of K.
+    relative_rounding: f64,
+}
+
+/// A symmetric matrix and the method of its products.
+#[derive(Debug)]
+pub(super) struct Operator {
+    matrix: SparseColMat<usize, f64>,
+    product: Product<f64>,
+}
+
+impl Operator {
+    fn new(matrix: SparseColMat<usize, f64>) -> Self {
+        Self { product: Product::new(matrix.as_ref(), Symmetry::Symmetric), matrix }
+    }
+
+    /// The products with vectors, column by column.
+    pub(super) fn times(&mut self, x: &[f64]) -> Vec<f64> {
+        let (n, mut out) = (self.matrix.ncols(), vec![0.0; x.len()]);
+        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+            self.product.write(1.0, self.matrix.as_ref(), x, out);
+        }
+        out
+    }
 }
 
 /// Checks and lists the free dofs, ascending.
@@ -126,26 +139,24 @@ impl Pencil {
         let Some(&median) = ratios.get(ratios.len() / 2) else {
             return Err(Error::Mass { dof: free[0], value: 0.0 });
         };
-        let rounding = T::epsilon().value();
-        // If all bodies are rigid there is no frequency, and any shift works.
-        let shift = if median > 0.0 { median * SHIFT.max(64.0 * rounding) } else { 1.0 };
+        let relative_rounding = rounding(T::one()).value();
+        // Small compared with the squared frequencies of elastic motions except for very long chains, and large
+        // compared with the rounding of K. If all bodies are rigid there is no frequency, and any shift works.
+        let shift = if median > 0.0 { median * half_digits::<f64>().max(relative_rounding) } else { 1.0 };
         let sum = Combination::new(n, &[], &[k.symbolic(), m.symbolic()])?;
         let mut pencil = Self {
             dofs,
             rank: ratios.len(),
             shift,
-            blur: 16.0 * f64::EPSILON * median,
-            by_mass: Product::new(m, Symmetry::Symmetric),
-            by_stiffness: Product::new(k, Symmetry::Symmetric),
+            blur: rounding(median),
             factor: Automatic.analyze(sum.pattern(), &[])?,
             factorizations: 0,
             solves: 0,
-            rounding,
-            bodies: parts(&sum, n),
+            relative_rounding,
             sum,
             free,
-            mass,
-            stiffness,
+            mass: Operator::new(mass),
+            stiffness: Operator::new(stiffness),
         };
         let values = pencil.shifted(shift)?;
         pencil.factor.factorize(pencil.sum.view(&values)).map_err(|error| match error {
@@ -164,27 +175,16 @@ impl Pencil {
         self.free.len()
     }
 
+    /// Number of unconnected parts.
+    pub(super) fn bodies(&self) -> usize {
+        components(self.sum.pattern()).1.len()
+    }
+
     /// Values of K + σM.
     fn shifted(&self, shift: f64) -> Result<Vec<f64>> {
         let mut values = memory::zeros(self.sum.len(), 1, "the shifted stiffness matrix")?;
-        self.sum.fill(&[(1.0, self.stiffness.val()), (shift, self.mass.val())], None, &mut values);
+        self.sum.fill(&[(1.0, self.stiffness.matrix.val()), (shift, self.mass.matrix.val())], None, &mut values);
         Ok(values)
-    }
-
-    /// `out = M x`, column by column.
-    pub(super) fn mass_product(&mut self, x: &[f64], out: &mut [f64]) {
-        let n = self.size();
-        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
-            self.by_mass.write(1.0, self.mass.as_ref(), x, out);
-        }
-    }
-
-    /// `out = K x`, column by column.
-    pub(super) fn stiffness_product(&mut self, x: &[f64], out: &mut [f64]) {
-        let n = self.size();
-        for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
-            self.by_stiffness.write(1.0, self.stiffness.as_ref(), x, out);
-        }
     }
 
     /// `x ← (K + σM)⁻¹ x`, column by column.
@@ -207,13 +207,13 @@ impl Pencil {
     /// within the rounding of its sum of terms. `product` is K x.
     pub(super) fn quotient(&self, x: &[f64], product: &[f64]) -> f64 {
         let energy: f64 = x.iter().zip(product).map(|(x, f)| x * f).sum();
-        let k = self.stiffness.as_ref();
+        let k = self.stiffness.matrix.as_ref();
         let column = |j: usize| -> f64 {
             let entries = k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j));
             entries.map(|(&i, &value)| (value * x[i]).abs()).sum::<f64>() * x[j].abs()
         };
         let size: f64 = (0..x.len()).map(column).sum();
-        if energy.abs() <= RIGID * self.rounding * size { 0.0 } else { energy }
+        if energy.abs() <= self.relative_rounding * size { 0.0 } else { energy }
     }
 
     /// Extends columns on the free dofs to all dofs.
@@ -230,25 +230,4 @@ impl Pencil {
     pub(super) fn restrict(&self, x: &[f64]) -> Vec<f64> {
         x.chunks_exact(self.dofs).flat_map(|x| self.free.iter().map(|&dof| x[dof])).collect()
     }
-}
-
-/// The number of unconnected parts of a pattern.
-fn parts(sum: &Combination, n: usize) -> usize {
-    let pattern = sum.pattern();
-    let (mut seen, mut stack, mut count) = (vec![false; n], Vec::new(), 0);
-    for start in 0..n {
-        if std::mem::replace(&mut seen[start], true) {
-            continue;
-        }
-        count += 1;
-        stack.push(start);
-        while let Some(dof) = stack.pop() {
-            for &next in pattern.row_idx_of_col_raw(dof) {
-                if !std::mem::replace(&mut seen[next], true) {
-                    stack.push(next);
-                }
-            }
-        }
-    }
-    count
 }

@@ -1,7 +1,6 @@
 //! Reduced bodies without a time scheme: each mode is solved exactly within a step.
 
-use super::body::ReducedBody;
-use super::builder::Boundary;
+use super::body::{Boundary, ReducedBody};
 use super::exact_step::ExactStep;
 use crate::contact::{ContactConstraint, LinearRows};
 use crate::contact_id::ContactId;
@@ -10,13 +9,12 @@ use crate::dense::{DenseCholesky, dot};
 use crate::error::{Error, Result, step_size};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::{half_digits, rounding};
+use crate::sparse::check_vector;
 use std::f64::consts::PI;
 use std::ops::Range;
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
-
-/// A gap below this many roundings of its terms is zero.
-const ROUNDING: f64 = 16.0;
 
 /// Version numbers of the two contact matrices, for solvers that reuse data: at the start, and in the steps.
 const VERSIONS: [u64; 2] = [1, 2];
@@ -227,10 +225,7 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
         let contact = Contact::new(self.rows, self.solver, &bodies, dofs)?;
         let start = |what, given: Option<Vec<T>>| -> Result<Vec<T>> {
             let values = given.unwrap_or_else(|| vec![T::zero(); dofs]);
-            if values.len() != dofs {
-                return Err(Error::Dimension { what, expected: dofs, found: values.len() });
-            }
-            finite(what, &values)?;
+            check_vector(what, &values, dofs)?;
             Ok(values)
         };
         let state = Motion {
@@ -323,7 +318,7 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
     ///
     /// As [`step`](Self::step); the state is the one after the last successful step.
     pub fn run_until(&mut self, time: f64) -> Result<()> {
-        while time - self.time() > 1e-6 * self.h {
+        while time - self.time() > half_digits::<f64>() * self.h {
             self.step()?;
         }
         Ok(())
@@ -340,22 +335,22 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         self.loads.evaluate(time)?;
         let Self { bodies, state, next, loads, contact, h, .. } = self;
         for body in bodies.iter() {
-            body.take_loads(&loads.values, &mut next.force);
-            body.move_freely(state, next);
-            body.follow(&next.force, &mut next.displacement);
+            body.convert_loads(&loads.values, &mut next.force);
+            body.advance_modes(state, next);
+            body.evaluate_contact_dofs(&next.force, &mut next.displacement);
         }
         next.multipliers.copy_from_slice(&state.multipliers);
         contact.solve(time, None, next)?;
         let rate = T::of(1.0 / *h);
-        contact.press(&next.multipliers);
+        contact.apply_multipliers(&next.multipliers);
         for body in bodies.iter() {
-            body.push(&mut contact.forces, next);
-            body.follow(&next.force, &mut next.displacement);
+            body.add_response(&mut contact.forces, next);
+            body.evaluate_contact_dofs(&next.force, &mut next.displacement);
             // λ̇ replaces λ.
             for dof in body.contact.clone() {
                 contact.forces[dof] = rate * (next.force[dof] - state.force[dof]);
             }
-            body.follow(&contact.forces, &mut next.velocity);
+            body.evaluate_contact_dofs(&contact.forces, &mut next.velocity);
         }
         for (what, values) in [("displacement", &next.displacement), ("velocity", &next.velocity)] {
             if let Some(dof) = values.iter().position(|x| !x.is_finite()) {
@@ -374,17 +369,17 @@ impl<'a, T: Real> ModalPropagation<'a, T> {
         self.loads.evaluate(self.start)?;
         let Self { bodies, state, loads, contact, .. } = self;
         for body in bodies.iter() {
-            body.take_loads(&loads.values, &mut state.force);
-            body.follow(&state.force, &mut state.displacement);
+            body.convert_loads(&loads.values, &mut state.force);
+            body.evaluate_contact_dofs(&state.force, &mut state.displacement);
         }
         let delassus = contact.delassus(bodies, |body| body.flexibility.clone())?;
         contact.solve(self.start, Some(&delassus), state)?;
-        contact.press(&state.multipliers);
+        contact.apply_multipliers(&state.multipliers);
         for body in bodies.iter() {
-            body.press(&contact.forces[body.contact.clone()], &mut state.force);
-            body.follow(&state.force, &mut state.displacement);
+            body.add_contact_forces(&contact.forces[body.contact.clone()], &mut state.force);
+            body.evaluate_contact_dofs(&state.force, &mut state.displacement);
             contact.forces[body.contact.clone()].fill(T::zero());
-            body.follow(&contact.forces, &mut state.velocity);
+            body.evaluate_contact_dofs(&contact.forces, &mut state.velocity);
         }
         contact.gaps(self.start, state)
     }
@@ -395,15 +390,7 @@ impl<T: Real> Loads<'_, T> {
         let Some(LoadFunction(load)) = &mut self.function else { return Ok(()) };
         self.values.fill(T::zero());
         load(time, &mut self.values);
-        finite("the load on reduced bodies", &self.values)
-    }
-}
-
-/// Rejects values that are not finite.
-fn finite<T: Real>(what: &'static str, values: &[T]) -> Result<()> {
-    match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
-        None => Ok(()),
+        check_vector("the load on reduced bodies", &self.values, self.values.len())
     }
 }
 
@@ -475,14 +462,14 @@ impl<T: Real> Body<T> {
     }
 
     /// Converts loads to forces on modes and contact dofs.
-    fn take_loads(&self, loads: &[T], force: &mut [T]) {
+    fn convert_loads(&self, loads: &[T], force: &mut [T]) {
         force[self.modes.clone()].copy_from_slice(&loads[self.modes.clone()]);
         force[self.contact.clone()].fill(T::zero());
-        self.press(&loads[self.contact.clone()], force);
+        self.add_contact_forces(&loads[self.contact.clone()], force);
     }
 
     /// Adds forces on the contact dofs, and the resulting forces on the modes.
-    fn press(&self, forces: &[T], out: &mut [T]) {
+    fn add_contact_forces(&self, forces: &[T], out: &mut [T]) {
         let (modes, contact) = (self.modes.clone(), self.contact.clone());
         for (row, &force) in self.coupling.chunks_exact(modes.len()).zip(forces) {
             T::axpy(force, row, &mut out[modes.clone()]);
@@ -491,7 +478,7 @@ impl<T: Real> Body<T> {
     }
 
     /// The modes at the end of a step without contact forces at that time.
-    fn move_freely(&self, state: &Motion<T>, next: &mut Motion<T>) {
+    fn advance_modes(&self, state: &Motion<T>, next: &mut Motion<T>) {
         for (dof, step) in self.modes.clone().zip(&self.steps) {
             let (u, v, forces) = (state.displacement[dof], state.velocity[dof], [state.force[dof], next.force[dof]]);
             let row = |k: usize| {
@@ -504,7 +491,7 @@ impl<T: Real> Body<T> {
 
     /// Adds the response to contact forces at the end of the step. `forces` has the forces on the contact dofs; the
     /// forces on the modes are written to it.
-    fn push(&self, forces: &mut [T], next: &mut Motion<T>) {
+    fn add_response(&self, forces: &mut [T], next: &mut Motion<T>) {
         let (before, contact) = forces.split_at_mut(self.contact.start);
         let (pushed, contact) = (&mut before[self.modes.clone()], &contact[..self.contact.len()]);
         pushed.fill(T::zero());
@@ -515,11 +502,11 @@ impl<T: Real> Body<T> {
             next.displacement[dof] += step.force[0][1] * force;
             next.velocity[dof] += step.force[1][1] * force;
         }
-        self.press(contact, &mut next.force);
+        self.add_contact_forces(contact, &mut next.force);
     }
 
     /// u_b = P η + F f, both over all dofs.
-    fn follow(&self, forces: &[T], values: &mut [T]) {
+    fn evaluate_contact_dofs(&self, forces: &[T], values: &mut [T]) {
         let forces = &forces[self.contact.clone()];
         let (modes, contact) = values.split_at_mut(self.contact.start);
         let modes = &modes[self.modes.clone()];
@@ -619,10 +606,7 @@ impl<'a, T: Real> Contact<'a, T> {
     /// The multipliers at the end of a step, from displacements without contact; at the start with another W.
     fn solve(&mut self, time: f64, delassus: Option<&[T]>, motion: &mut Motion<T>) -> Result<()> {
         self.gaps(time, motion)?;
-        let share = T::of(ROUNDING) * T::epsilon();
-        for size in &mut self.tolerance {
-            *size *= share;
-        }
+        self.tolerance.iter_mut().for_each(|size| *size = rounding(*size));
         self.offset.copy_from_slice(&motion.gaps);
         let (matrix, version) = match delassus {
             Some(delassus) => (delassus, VERSIONS[0]),
@@ -637,7 +621,7 @@ impl<'a, T: Real> Contact<'a, T> {
     }
 
     /// Writes Gᵀ λ into the forces.
-    fn press(&mut self, multipliers: &[T]) {
+    fn apply_multipliers(&mut self, multipliers: &[T]) {
         self.forces.fill(T::zero());
         for (row, &multiplier) in self.entries.iter().zip(multipliers) {
             for &(dof, weight) in row {

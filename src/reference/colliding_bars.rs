@@ -2,13 +2,7 @@
 
 use super::bar::{Bar, Body, Steps};
 use super::error::{MAX_EVENTS, ReferenceError, finite, positive};
-
-/// Events closer than this fraction of the time scale are one event split by rounding.
-const SAME_TIME: f64 = 1e-12;
-/// Fraction of the impact speed below which two contact ends move together.
-const SAME_VELOCITY: f64 = 1e-12;
-/// Fraction of the impact speed below which a jump is rounding and no wave.
-const NO_JUMP: f64 = 8.0 * f64::EPSILON;
+use crate::rounding::{ONLY_ROUNDING, rounding};
 
 /// Which of the two colliding bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -136,13 +130,13 @@ impl CollidingBars {
         for _ in 0..MAX_EVENTS {
             let [from_left, from_right] = [0, 1].map(|i| self.bodies[i].outgoing.0[fronts[i] - 1].value);
             let closing = from_left - from_right;
-            let touching = gap <= 0.0 && closing >= -SAME_VELOCITY * scale;
+            let touching = gap <= 0.0 && closing >= -ONLY_ROUNDING * scale;
             // The force that gives the ends one velocity. A remainder of rounding size, of either sign, is no
             // pressure.
             let bond = if touching { closing / compliance } else { 0.0 };
-            let pressing = closing > SAME_VELOCITY * scale;
+            let pressing = closing > ONLY_ROUNDING * scale;
             let force = if pressing { bond } else { 0.0 };
-            let noise = NO_JUMP * scale;
+            let noise = rounding(scale);
             let [left, right] = &mut self.bodies;
             let left_answer = from_left - 2.0 * bond * compliances[0];
             let right_answer = from_right + 2.0 * bond * compliances[1];
@@ -189,7 +183,7 @@ impl CollidingBars {
 
     /// Rounding error of a time near `t`.
     fn slack(&self, t: f64) -> f64 {
-        SAME_TIME * (t + 2.0 * self.bodies[0].transit.min(self.bodies[1].transit))
+        ONLY_ROUNDING * (t + 2.0 * self.bodies[0].transit.min(self.bodies[1].transit))
     }
 
     fn covers(&self, t: f64) -> bool {

@@ -1,5 +1,6 @@
 //! Rows and their arithmetic.
 
+use crate::rounding::rounding;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// How many past states a row may read.
@@ -81,7 +82,7 @@ impl Row {
         let factor = self.z / zero.z;
         let cancel = |x: f64, y: f64| {
             let (y, difference) = (factor * y, x - factor * y);
-            if difference.abs() <= 16.0 * f64::EPSILON * x.abs().max(y.abs()) { 0.0 } else { difference }
+            if difference.abs() <= rounding(x.abs().max(y.abs())) { 0.0 } else { difference }
         };
         Self { z: self.z, ..self.zip(zero, cancel) }
     }

@@ -3,7 +3,6 @@
 
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
-use contact_dynamics::linear_solver::Preconditioner;
 use contact_dynamics::{
     ByBody, Cholesky, Composite, ConjugateGradients, Error, Factorization, LinearSolver, LinearSystem, Newmark,
     NodesOnObstacle, PersistencyCorrection, Real, Result, Simulation, SimulationBuilder, StepControl,
@@ -14,8 +13,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SOFT: Material = Material { young: 50.0, poisson: 0.25, density: 1.0 };
-const ALL: [Preconditioner; 3] =
-    [Preconditioner::Nodes, Preconditioner::GaussSeidel, Preconditioner::IncompleteCholesky];
 
 type Matrix<T> = SparseColMat<usize, T>;
 /// M/dt² + K of a solid at a Courant number.
@@ -62,41 +59,27 @@ fn cases() -> Vec<(usize, Vec<Entry>)> {
 fn solutions_are_those_of_cholesky() {
     for (n, entries) in cases() {
         let (a, single) = (matrix::<f64>(n, entries.clone()), matrix::<f32>(n, entries));
-        for preconditioner in ALL {
-            let solver = ConjugateGradients::default().preconditioner(preconditioner);
-            let (mut expected, mut found) = (rhs::<f64>(2 * n), rhs::<f64>(2 * n));
-            factorized(&Cholesky::default(), &a).solve(&mut expected).unwrap();
-            let mut iterative = factorized(&solver, &a);
-            iterative.solve(&mut found).unwrap();
-            assert!(
-                difference(&found, &expected) < 1e-9,
-                "{n} {preconditioner:?}: {:e}",
-                difference(&found, &expected)
-            );
-            assert!(iterative.iterations() > 0 && iterative.condensation().is_none());
-            // Bit for bit again, each column alone.
-            let mut again = rhs::<f64>(2 * n);
-            again.chunks_mut(n).for_each(|column| iterative.solve(column).unwrap());
-            assert_eq!(found, again);
-            // To rounding if so asked, which ends too.
-            let exact = solver.tolerance(0.0).unwrap();
-            let mut found = rhs::<f64>(2 * n);
-            factorized(&exact, &a).solve(&mut found).unwrap();
-            assert!(
-                difference(&found, &expected) < 1e-12,
-                "{n} {preconditioner:?}: {:e}",
-                difference(&found, &expected)
-            );
-            for solver in [solver, exact] {
-                let mut found = rhs::<f32>(2 * n);
-                factorized(&solver, &single).solve(&mut found).unwrap();
-                let wide: Vec<f64> = found.iter().map(|x| f64::from(*x)).collect();
-                assert!(
-                    difference(&wide, &expected) < 2e-5,
-                    "{n} {preconditioner:?}: {:e}",
-                    difference(&wide, &expected)
-                );
-            }
+        let solver = ConjugateGradients::default();
+        let (mut expected, mut found) = (rhs::<f64>(2 * n), rhs::<f64>(2 * n));
+        factorized(&Cholesky::default(), &a).solve(&mut expected).unwrap();
+        let mut iterative = factorized(&solver, &a);
+        iterative.solve(&mut found).unwrap();
+        assert!(difference(&found, &expected) < 1e-9, "{n} {:e}", difference(&found, &expected));
+        assert!(iterative.iterations() > 0 && iterative.condensation().is_none());
+        // Bit for bit again, each column alone.
+        let mut again = rhs::<f64>(2 * n);
+        again.chunks_mut(n).for_each(|column| iterative.solve(column).unwrap());
+        assert_eq!(found, again);
+        // To rounding if so asked, which ends too.
+        let exact = solver.tolerance(0.0).unwrap();
+        let mut found = rhs::<f64>(2 * n);
+        factorized(&exact, &a).solve(&mut found).unwrap();
+        assert!(difference(&found, &expected) < 1e-12, "{n} {:e}", difference(&found, &expected));
+        for solver in [solver, exact] {
+            let mut found = rhs::<f32>(2 * n);
+            factorized(&solver, &single).solve(&mut found).unwrap();
+            let wide: Vec<f64> = found.iter().map(|x| f64::from(*x)).collect();
+            assert!(difference(&wide, &expected) < 2e-5, "{n} {:e}", difference(&wide, &expected));
         }
     }
 }
@@ -114,34 +97,18 @@ fn a_looser_tolerance_is_met_with_fewer_iterations() {
         }
         sum.sqrt()
     };
-    for preconditioner in ALL {
-        let mut counts = Vec::new();
-        for tolerance in [1e-2, 1e-5, 1e-8] {
-            let solver = ConjugateGradients::default().preconditioner(preconditioner).tolerance(tolerance).unwrap();
-            let (mut factor, mut x) = (factorized(&solver, &a), rhs::<f64>(n));
-            factor.solve(&mut x).unwrap();
-            let error: Vec<f64> = x.iter().zip(&expected).map(|(x, y)| x - y).collect();
-            let error = energy(&error) / energy(&expected);
-            // The norm of the preconditioner is nearly that of the matrix.
-            assert!(error < 5.0 * tolerance && error > 1e-3 * tolerance, "{preconditioner:?} {tolerance:e}: {error:e}");
-            counts.push(factor.iterations());
-        }
-        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "{preconditioner:?}: {counts:?}");
+    let mut counts = Vec::new();
+    for tolerance in [1e-2, 1e-5, 1e-8] {
+        let solver = ConjugateGradients::default().tolerance(tolerance).unwrap();
+        let (mut factor, mut x) = (factorized(&solver, &a), rhs::<f64>(n));
+        factor.solve(&mut x).unwrap();
+        let error: Vec<f64> = x.iter().zip(&expected).map(|(x, y)| x - y).collect();
+        let error = energy(&error) / energy(&expected);
+        // The norm of the preconditioner is nearly that of the matrix.
+        assert!(error < 5.0 * tolerance && error > 1e-3 * tolerance, "{tolerance:e}: {error:e}");
+        counts.push(factor.iterations());
     }
-}
-
-#[test]
-fn preconditioners_need_the_iterations_their_names_promise() {
-    let block = Solid::block([1.0; 3], [6; 3], SOFT);
-    for courant in [1.0, 5.0] {
-        let a = matrix::<f64>(block.dofs(), effective(&block, 1.0 / 6.0, courant));
-        let [nodes, sweeps, incomplete] = ALL.map(|preconditioner| {
-            let mut factor = factorized(&ConjugateGradients::default().preconditioner(preconditioner), &a);
-            factor.solve(&mut rhs::<f64>(block.dofs())).unwrap();
-            factor.iterations()
-        });
-        assert!(nodes > sweeps && sweeps > incomplete, "{courant}: {nodes} {sweeps} {incomplete}");
-    }
+    assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "{counts:?}");
 }
 
 #[test]
@@ -171,31 +138,29 @@ fn units_do_not_matter() {
         x.iter_mut().enumerate().for_each(|(i, x)| *x *= scale(i));
         (a, x)
     };
-    for preconditioner in ALL {
-        let solve = |scale: fn(usize) -> f64| {
-            let (a, mut x) = units(scale);
-            let mut factor = factorized(&ConjugateGradients::default().preconditioner(preconditioner), &a);
-            factor.solve(&mut x).unwrap();
-            x.iter_mut().enumerate().for_each(|(i, x)| *x *= scale(i));
-            (x, factor.iterations())
-        };
-        let (x, iterations) = solve(|_| 1.0);
-        assert!(iterations > 5, "{preconditioner:?}: {iterations}");
-        for scale in [
-            (|_| 1e-3) as fn(usize) -> f64,
-            |_| 1e-90,
-            |_| 1e90,
-            |i| if i % 2 == 0 { 1e3 } else { 1.0 },
-            |i| if i % 2 == 0 { 1e-6 } else { 1e6 },
-        ] {
-            let (scaled, count) = solve(scale);
-            assert_eq!(count, iterations, "{preconditioner:?}");
-            assert!(difference(&scaled, &x) < 1e-11, "{preconditioner:?}: {:e}", difference(&scaled, &x));
-        }
-        // By powers of two even to the last bit.
-        let (scaled, _) = solve(|_| 0.125);
-        assert_eq!(scaled, x);
+    let solve = |scale: fn(usize) -> f64| {
+        let (a, mut x) = units(scale);
+        let mut factor = factorized(&ConjugateGradients::default(), &a);
+        factor.solve(&mut x).unwrap();
+        x.iter_mut().enumerate().for_each(|(i, x)| *x *= scale(i));
+        (x, factor.iterations())
+    };
+    let (x, iterations) = solve(|_| 1.0);
+    assert!(iterations > 5, "{iterations}");
+    for scale in [
+        (|_| 1e-3) as fn(usize) -> f64,
+        |_| 1e-90,
+        |_| 1e90,
+        |i| if i % 2 == 0 { 1e3 } else { 1.0 },
+        |i| if i % 2 == 0 { 1e-6 } else { 1e6 },
+    ] {
+        let (scaled, count) = solve(scale);
+        assert_eq!(count, iterations);
+        assert!(difference(&scaled, &x) < 1e-11, "{:e}", difference(&scaled, &x));
     }
+    // By powers of two even to the last bit.
+    let (scaled, _) = solve(|_| 0.125);
+    assert_eq!(scaled, x);
     // The size of the right-hand side: squares of small and of large forces leave the range of the scalar.
     let a = matrix::<f32>(50, chain(50, 0.5));
     let mut factor = factorized(&ConjugateGradients::default(), &a);
@@ -212,44 +177,40 @@ fn units_do_not_matter() {
 #[test]
 fn forces_that_are_hardly_numbers_have_solutions() {
     let a = matrix::<f32>(50, chain(50, 0.1));
-    for preconditioner in ALL {
-        let mut factor = factorized(&ConjugateGradients::default().preconditioner(preconditioner), &a);
-        let mut natural = rhs::<f32>(50);
-        factor.solve(&mut natural).unwrap();
-        for exponent in [-60, -110, -130] {
-            let unit = 2.0_f32.powi(exponent / 2);
-            let mut small: Vec<f32> = rhs::<f32>(50).iter().map(|x| x * unit * unit).collect();
-            factor.solve(&mut small).unwrap();
-            // (Below 2⁻¹²⁶ numbers lose their digits.)
-            let most = 1e-4 + 2.0_f32.powi(-149 - exponent) * 50.0;
-            let worst = small.iter().zip(&natural).map(|(x, y)| (x / unit / unit - y).abs()).fold(0.0, f32::max);
-            let size = natural.iter().fold(0.0_f32, |size, x| size.max(x.abs()));
-            assert!(worst < most * size, "2^{exponent}: {worst:e} of {size:e}");
-        }
+    let mut factor = factorized(&ConjugateGradients::default(), &a);
+    let mut natural = rhs::<f32>(50);
+    factor.solve(&mut natural).unwrap();
+    for exponent in [-60, -110, -130] {
+        let unit = 2.0_f32.powi(exponent / 2);
+        let mut small: Vec<f32> = rhs::<f32>(50).iter().map(|x| x * unit * unit).collect();
+        factor.solve(&mut small).unwrap();
+        // (Below 2⁻¹²⁶ numbers lose their digits.)
+        let most = 1e-4 + 2.0_f32.powi(-149 - exponent) * 50.0;
+        let worst = small.iter().zip(&natural).map(|(x, y)| (x / unit / unit - y).abs()).fold(0.0, f32::max);
+        let size = natural.iter().fold(0.0_f32, |size, x| size.max(x.abs()));
+        assert!(worst < most * size, "2^{exponent}: {worst:e} of {size:e}");
     }
 }
 
 #[test]
 fn zero_and_nan_come_back_as_they_are() {
     let a = matrix::<f64>(50, chain(50, 0.1));
-    for preconditioner in ALL {
-        let mut factor = factorized(&ConjugateGradients::default().preconditioner(preconditioner), &a);
-        let mut x = rhs::<f64>(50);
-        factor.solve(&mut x).unwrap();
-        for bad in [f64::NAN, f64::INFINITY] {
-            let mut wrong = rhs::<f64>(50);
-            wrong[17] = bad;
-            factor.solve(&mut wrong).unwrap();
-            assert!(wrong.iter().all(|x| x.is_nan()));
-        }
-        let mut zero = vec![0.0; 100];
-        zero[3] = -0.0;
-        factor.solve(&mut zero).unwrap();
-        assert!(zero.iter().all(|x| *x == 0.0) && factor.iterations() == 0);
-        let mut again = rhs::<f64>(50);
-        factor.solve(&mut again).unwrap();
-        assert_eq!(x, again);
+    let mut factor = factorized(&ConjugateGradients::default(), &a);
+    let mut x = rhs::<f64>(50);
+    factor.solve(&mut x).unwrap();
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut wrong = rhs::<f64>(50);
+        wrong[17] = bad;
+        factor.solve(&mut wrong).unwrap();
+        assert!(wrong.iter().all(|x| x.is_nan()));
     }
+    let mut zero = vec![0.0; 100];
+    zero[3] = -0.0;
+    factor.solve(&mut zero).unwrap();
+    assert!(zero.iter().all(|x| *x == 0.0) && factor.iterations() == 0);
+    let mut again = rhs::<f64>(50);
+    factor.solve(&mut again).unwrap();
+    assert_eq!(x, again);
 }
 
 /// pᵀAp over pᵀdiag(A)p along any direction is between the eigenvalues of A with its diagonal scaled to one.
@@ -257,9 +218,7 @@ fn zero_and_nan_come_back_as_they_are() {
 fn the_curvature_that_refuses_a_matrix_is_one_that_it_has() {
     // (Of so many dofs that they are not taken for nodes of two or three.)
     let cases = [5, 7, 11, 13].into_iter().flat_map(|n| [0.6, 0.9, 1.7, 4.0].map(|coupling| (n, coupling)));
-    for (preconditioner, (n, coupling)) in
-        ALL.into_iter().flat_map(|which| cases.clone().map(move |case| (which, case)))
-    {
+    for (n, coupling) in cases {
         let chain: Vec<Entry> = (0..n)
             .map(|i| (i, i, 1.0))
             .chain((1..n).flat_map(|i| [(i - 1, i, coupling), (i, i - 1, coupling)]))
@@ -267,15 +226,14 @@ fn the_curvature_that_refuses_a_matrix_is_one_that_it_has() {
         // (The eigenvalues of a chain are 1 + 2 c cos(k π/(n + 1)).)
         let least = 1.0 - 2.0 * coupling * (std::f64::consts::PI / (n as f64 + 1.0)).cos();
         let a = matrix::<f64>(n, chain);
-        let solver = ConjugateGradients::default().preconditioner(preconditioner);
+        let solver = ConjugateGradients::default();
         let mut factor = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap();
         let found = factor.factorize(a.as_ref()).and_then(|()| factor.solve(&mut rhs::<f64>(n)));
         match found {
-            Err(Error::Indefinite { curvature, .. }) => assert!(
-                curvature < 0.0 && curvature > least - 1e-12,
-                "{preconditioner:?} {n} {coupling}: {curvature}, not above {least}"
-            ),
-            other => panic!("{preconditioner:?} {n} {coupling}: {other:?}"),
+            Err(Error::Indefinite { curvature, .. }) => {
+                assert!(curvature < 0.0 && curvature > least - 1e-12, "{n} {coupling}: {curvature}, not above {least}")
+            }
+            other => panic!("{n} {coupling}: {other:?}"),
         }
     }
 }
@@ -288,103 +246,73 @@ fn what_cannot_be_solved_is_refused() {
         let result = factor.factorize(a.as_ref()).and_then(|()| factor.solve(&mut rhs::<f64>(n)));
         result.unwrap_err()
     };
-    for preconditioner in ALL {
-        let solver = ConjugateGradients::default().preconditioner(preconditioner);
-        // Not positive on the diagonal, within a block of a node, and only as a whole.
-        let mut diagonal = chain(50, 0.1);
-        diagonal.push((7, 7, -9.0));
-        assert!(matches!(refused(solver, 50, diagonal), Error::Singular { dof: 7, .. }));
-        let node = vec![
-            (0, 0, 1.0),
-            (0, 1, 2.0),
-            (1, 0, 2.0),
-            (1, 1, 1.0),
-            (2, 2, 1.0),
-            (3, 3, 1.0),
-            (2, 3, 0.1),
-            (3, 2, 0.1),
-        ];
-        assert!(matches!(refused(solver, 4, node), Error::Singular { dof: 1, .. }), "{preconditioner:?}");
-        let found = refused(solver, 50, chain(50, -0.5));
-        assert!(matches!(found, Error::Indefinite { dof: 0..50, curvature } if curvature < 0.0), "{found:?}");
-        assert!(found.to_string().contains("not positive definite") && !found.is_recoverable());
-        // A negative spring amid others: it is named.
-        let mut negative = chain(50, 0.5);
-        negative.extend([(30, 30, -0.5), (31, 31, -0.5), (30, 31, 4.0), (31, 30, 4.0)]);
-        let found = refused(solver, 50, negative);
-        assert!(matches!(found, Error::Indefinite { dof: 30 | 31, curvature } if curvature < 0.0), "{found:?}");
-        let mut nan = chain(50, 0.1);
-        nan.extend([(3, 4, f64::NAN), (4, 3, f64::NAN)]);
-        assert!(matches!(refused(solver, 50, nan), Error::MatrixNotFinite { .. }));
-        let mut asymmetric = chain(50, 0.1);
-        asymmetric.push((3, 4, 0.5));
-        assert!(matches!(refused(solver, 50, asymmetric), Error::Asymmetric { .. }));
-        // A singular matrix: a free chain under forces that have a sum.
-        let found = refused(solver, 60, chain(60, 0.0));
-        let singular = matches!(found, Error::Indefinite { curvature, .. } if curvature.abs() < 1e-14);
-        assert!(singular || matches!(found, Error::LinearNotConverged { .. }), "{found:?}");
-        let bridges = (0..45).flat_map(|i| [(i, i, 1.0), (i + 5, i + 5, 1.0), (i, i + 5, -1.0), (i + 5, i, -1.0)]);
-        let found = refused(solver.iterations(2), 50, chain(50, 0.01).into_iter().chain(bridges).collect());
-        match found {
-            Error::LinearNotConverged { iterations: 2, residual, tolerance, .. } => {
-                assert!(residual > 1e-3 && tolerance == 1e-10);
-            }
-            other => panic!("{other:?}"),
+    let solver = ConjugateGradients::default();
+    // Not positive on the diagonal, within a block of a node, and only as a whole.
+    let mut diagonal = chain(50, 0.1);
+    diagonal.push((7, 7, -9.0));
+    assert!(matches!(refused(solver, 50, diagonal), Error::Singular { dof: 7, .. }));
+    let node =
+        vec![(0, 0, 1.0), (0, 1, 2.0), (1, 0, 2.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, 1.0), (2, 3, 0.1), (3, 2, 0.1)];
+    assert!(matches!(refused(solver, 4, node), Error::Singular { dof: 1, .. }));
+    let found = refused(solver, 50, chain(50, -0.5));
+    assert!(matches!(found, Error::Indefinite { dof: 0..50, curvature } if curvature < 0.0), "{found:?}");
+    assert!(found.to_string().contains("not positive definite") && !found.is_recoverable());
+    // A negative spring amid others: it is named.
+    let mut negative = chain(50, 0.5);
+    negative.extend([(30, 30, -0.5), (31, 31, -0.5), (30, 31, 4.0), (31, 30, 4.0)]);
+    let found = refused(solver, 50, negative);
+    assert!(matches!(found, Error::Indefinite { dof: 30 | 31, curvature } if curvature < 0.0), "{found:?}");
+    let mut nan = chain(50, 0.1);
+    nan.extend([(3, 4, f64::NAN), (4, 3, f64::NAN)]);
+    assert!(matches!(refused(solver, 50, nan), Error::MatrixNotFinite { .. }));
+    let mut asymmetric = chain(50, 0.1);
+    asymmetric.push((3, 4, 0.5));
+    assert!(matches!(refused(solver, 50, asymmetric), Error::Asymmetric { .. }));
+    // A singular matrix: a free chain under forces that have a sum.
+    let found = refused(solver, 60, chain(60, 0.0));
+    let singular = matches!(found, Error::Indefinite { curvature, .. } if curvature.abs() < 1e-14);
+    assert!(singular || matches!(found, Error::LinearNotConverged { .. }), "{found:?}");
+    let bridges = (0..45).flat_map(|i| [(i, i, 1.0), (i + 5, i + 5, 1.0), (i, i + 5, -1.0), (i + 5, i, -1.0)]);
+    let found = refused(solver.iterations(2), 50, chain(50, 0.01).into_iter().chain(bridges).collect());
+    match found {
+        Error::LinearNotConverged { iterations: 2, residual, tolerance, .. } => {
+            assert!(residual > 1e-3 && tolerance == 1e-10);
         }
-        assert!(found.is_recoverable() && found.to_string().contains("2 iterations"));
-
-        let a = matrix::<f64>(50, chain(50, 0.1));
-        let mut factor = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap();
-        assert!(matches!(factor.solve(&mut rhs::<f64>(50)), Err(Error::Incompatible { .. })));
-        factor.factorize(a.as_ref()).unwrap();
-        assert!(matches!(factor.solve(&mut rhs::<f64>(49)), Err(Error::Dimension { expected: 50, found: 49, .. })));
-        let other = matrix::<f64>(49, chain(49, 0.1));
-        assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Dimension { .. })));
-        // What has failed is not used.
-        assert!(matches!(factor.solve(&mut rhs::<f64>(50)), Err(Error::Incompatible { .. })));
-        // As many entries, elsewhere.
-        let moved = (0..50).map(|i| (i, i, 1.0)).chain((1..50).flat_map(|i| {
-            let (a, b) = if i == 49 { (0, 49) } else { (i - 1, i) };
-            [(a, b, -0.1), (b, a, -0.1)]
-        }));
-        let moved = matrix::<f64>(50, moved);
-        assert!(matches!(factor.factorize(moved.as_ref()), Err(Error::Incompatible { .. })));
-        factor.factorize(a.as_ref()).unwrap();
-        factor.solve(&mut rhs::<f64>(50)).unwrap();
+        other => panic!("{other:?}"),
     }
+    assert!(found.is_recoverable() && found.to_string().contains("2 iterations"));
+
+    let a = matrix::<f64>(50, chain(50, 0.1));
+    let mut factor = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap();
+    assert!(matches!(factor.solve(&mut rhs::<f64>(50)), Err(Error::Incompatible { .. })));
+    factor.factorize(a.as_ref()).unwrap();
+    assert!(matches!(factor.solve(&mut rhs::<f64>(49)), Err(Error::Dimension { expected: 50, found: 49, .. })));
+    let other = matrix::<f64>(49, chain(49, 0.1));
+    assert!(matches!(factor.factorize(other.as_ref()), Err(Error::Dimension { .. })));
+    // What has failed is not used.
+    assert!(matches!(factor.solve(&mut rhs::<f64>(50)), Err(Error::Incompatible { .. })));
+    // As many entries, elsewhere.
+    let moved = (0..50).map(|i| (i, i, 1.0)).chain((1..50).flat_map(|i| {
+        let (a, b) = if i == 49 { (0, 49) } else { (i - 1, i) };
+        [(a, b, -0.1), (b, a, -0.1)]
+    }));
+    let moved = matrix::<f64>(50, moved);
+    assert!(matches!(factor.factorize(moved.as_ref()), Err(Error::Incompatible { .. })));
+    factor.factorize(a.as_ref()).unwrap();
+    factor.solve(&mut rhs::<f64>(50)).unwrap();
     for wrong in [-1e-3, 1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(ConjugateGradients::default().tolerance(wrong), Err(Error::Parameter { .. })));
     }
 }
 
 #[test]
-fn incomplete_factors_that_break_down_are_shifted() {
-    // Kershaw's matrix: positive definite, without an incomplete factor.
-    let kershaw = [[3.0, -2.0, 0.0, 2.0], [-2.0, 3.0, -2.0, 0.0], [0.0, -2.0, 3.0, -2.0], [2.0, 0.0, -2.0, 3.0]];
-    // Spread over dofs one by one, so that blocks have a size of one.
-    let entries = (0..16).map(|k| (7 * (k / 4), 7 * (k % 4), kershaw[k / 4][k % 4])).filter(|entry| entry.2 != 0.0);
-    let rest = (0..23).filter(|i| i % 7 != 0).map(|i| (i, i, 1.0));
-    let a = matrix::<f64>(23, entries.chain(rest));
-    let mut expected = rhs::<f64>(23);
-    factorized(&Cholesky::default(), &a).solve(&mut expected).unwrap();
-    let solver = ConjugateGradients::default().preconditioner(Preconditioner::IncompleteCholesky);
-    let mut x = rhs::<f64>(23);
-    factorized(&solver, &a).solve(&mut x).unwrap();
-    assert!(difference(&x, &expected) < 1e-9);
-}
-
-#[test]
 fn memory_is_that_of_half_the_matrix() {
     let block = Solid::block([1.0; 3], [6; 3], SOFT);
     let a = matrix::<f64>(block.dofs(), effective(&block, 1.0 / 6.0, 1.0));
-    let stored = |preconditioner| {
-        let solver = ConjugateGradients::default().preconditioner(preconditioner);
-        LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap().stored_values()
-    };
+    let solver = ConjugateGradients::default();
+    let stored = LinearSolver::<f64>::analyze(&solver, a.symbolic(), &[]).unwrap().stored_values();
     let (n, half) = (block.dofs(), a.val().len() / 2);
-    let [nodes, sweeps, incomplete] = ALL.map(stored);
-    assert!(nodes == sweeps && sweeps > half && sweeps < half + half / 10 + 8 * n, "{sweeps} {half} {n}");
-    assert!(incomplete > 2 * half && incomplete < 2 * half + half / 5 + 11 * n, "{incomplete} {half} {n}");
+    assert!(stored > half && stored < half + half / 10 + 8 * n, "{stored} {half} {n}");
 }
 
 /// A block that falls on a tilted floor, corner first: few contacts.
@@ -408,19 +336,17 @@ fn scene(solver: impl LinearSolver<f64> + 'static, h: f64) -> SimulationBuilder<
 fn steps_in_contact_are_those_of_cholesky() {
     let h = 0.25 / SOFT.wave_speed();
     let mut exact = falling(Cholesky::default(), h);
-    let mut runs = ALL.map(|p| falling(ConjugateGradients::default().preconditioner(p), h));
+    let mut run = falling(ConjugateGradients::default(), h);
     let mut pressed = 0;
     for _ in 0..60 {
         exact.step().unwrap();
         pressed += usize::from(exact.state().contacts().raw_forces().iter().any(|force| *force > 0.0));
-        for run in &mut runs {
-            run.step().unwrap();
-            let (a, b) = (run.state(), exact.state());
-            let [u, v] =
-                [(a.displacement(), b.displacement()), (a.velocity(), b.velocity())].map(|(a, b)| difference(a, b));
-            assert!(u < 1e-8 && v < 1e-7, "t = {}: {u:e} {v:e}", run.time());
-            assert_eq!(a.contacts().closed(), b.contacts().closed());
-        }
+        run.step().unwrap();
+        let (a, b) = (run.state(), exact.state());
+        let [u, v] =
+            [(a.displacement(), b.displacement()), (a.velocity(), b.velocity())].map(|(a, b)| difference(a, b));
+        assert!(u < 1e-8 && v < 1e-7, "t = {}: {u:e} {v:e}", run.time());
+        assert_eq!(a.contacts().closed(), b.contacts().closed());
     }
     assert!(pressed > 10, "{pressed}");
 }

@@ -2,6 +2,7 @@
 
 use super::separator::{BETWEEN, Separator};
 use crate::linear_solver::graph::{Graph, number};
+use crate::rounding::half_digits;
 
 /// Side 0 has the vertices below the median of the longest axis; vertices above with a neighbor below form the
 /// separator.
@@ -16,7 +17,7 @@ pub(super) fn bisect(graph: &Graph, places: &[[f64; 3]]) -> Separator {
     let middle = along.len() / 2;
     let (_, &mut median, _) = along.select_nth_unstable_by(middle, f64::total_cmp);
     // Nodes of one layer differ by rounding.
-    let layer = 1e-9 * extent(longest);
+    let layer = half_digits::<f64>() * extent(longest);
     let below = |vertex: u32| places[vertex as usize][longest] < median - layer;
     let label = |vertex: u32| match below(vertex) {
         true => 0,
