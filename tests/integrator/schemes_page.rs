@@ -1,6 +1,7 @@
 //! The tables of `docs/schemes.md` are those that the code prints.
 
-use contact_dynamics_scenes::tables;
+#[path = "../../examples/schemes/tables.rs"]
+mod tables;
 
 const PAGE: &str = include_str!("../../docs/schemes.md");
 

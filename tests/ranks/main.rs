@@ -5,4 +5,5 @@ mod bodies;
 mod checkpoint;
 mod equal;
 mod failures;
+mod parts;
 mod refusals;

@@ -5,6 +5,7 @@
 
 mod changes;
 mod friction;
+mod independent;
 mod laws;
 mod massless;
 mod newton;

@@ -14,7 +14,7 @@ mod hyperelastic;
 mod scene;
 mod slab;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -16,6 +16,9 @@ mod model;
 #[cfg(feature = "petsc")]
 mod multigrid;
 mod partition;
+#[allow(dead_code, unreachable_pub)]
+#[path = "../../../tests/ranks/parts.rs"]
+mod parts;
 mod restart;
 mod scale;
 mod share;
