@@ -1,7 +1,7 @@
 //! All hard cases of contact and friction, with every scheme, correction and mass that claims to handle them: what is
 //! asked, the worst that came out, and with what; and what must fail, failing as is known.
 //!
-//! `cargo run --release --example hard_cases` prints the tables of `docs/reliability.md` and writes them, in some
+//! `cargo run --release --example hard_cases` prints the tables of `docs/measured/hard_cases.md` and writes them, in some
 //! minutes; with `--quick` meshes are coarse, phases two, runs short. The program fails if a case does not hold.
 //!
 //! `tried.rs` says what claims what, `table.rs` what is asked; cases are in one file a subject.

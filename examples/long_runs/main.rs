@@ -1,7 +1,7 @@
 //! Runs of ten million steps: a bar that bounces, one at rest on a floor, a body at rest on a slope below its angle of
 //! friction. What drifts of energy, momentum, penetration and place, what is allocated, and whether steps get harder.
 //!
-//! `cargo run --release --example long_runs` prints the tables of `docs/reliability.md` and writes them, in about ten
+//! `cargo run --release --example long_runs` prints the tables of `docs/measured/long_runs.md` and writes them, in about ten
 //! minutes; `--steps N` takes so many steps, `--quick` twenty thousand. The program fails if something drifts that must
 //! not.
 //!

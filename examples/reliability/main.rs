@@ -1,7 +1,7 @@
 //! Where results were silently wrong, and what they are now: one file a subject, each case with the figure of the state
 //! before.
 //!
-//! `cargo run --release --example reliability` prints the table of `docs/reliability.md` and writes it; with `--quick`
+//! `cargo run --release --example reliability` prints the table of `docs/measured/reliability.md` and writes it; with `--quick`
 //! sweeps are shorter. Figures of "before" were printed by the same cases at commit 9fcb7b6; they are recorded here,
 //! for that state of the code is gone.
 

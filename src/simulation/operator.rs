@@ -1,11 +1,12 @@
 //! Effective matrices w_ū K + w_v̄/h C + w_ā/h² M, factorized, with the responses of contact rows on the interface.
 //!
-//! - `tangent`: the pattern of the effective matrix and the entries of its tangent.
+//! - `matrix`, `tangent`: the entries of the effective matrix, and the motion at which its tangent is evaluated.
 //! - `contact_path`, `interface`: the order of elimination, and the dofs that contact acts on.
 //! - `responses`, `delassus`: responses of the interface to unit forces, and the Delassus operator of the rows.
 
 pub(super) mod contact_path;
 pub(super) mod interface;
+pub(super) mod matrix;
 pub(super) mod responses;
 pub(super) mod tangent;
 
@@ -15,18 +16,15 @@ use crate::contact::{ContactJacobian, Groups, SpreadRow};
 use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
-use crate::mass::Mass;
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::largest_compliance;
 use crate::simulation::operator::contact_path::{ContactPath, analyze, condensation, respond};
+use crate::simulation::operator::matrix::EffectiveMatrix;
 use crate::simulation::operator::responses::{Responses, Unit};
-use crate::simulation::operator::tangent::{At, Tangent, TangentOf, check_sources, pattern};
-use crate::sparse::Combination;
-use crate::system::{Linearity, System, TangentWeights};
+use crate::simulation::operator::tangent::At;
+use crate::system::System;
 use delassus::Delassus;
-use faer::sparse::SparseColMatRef;
-
-const VALUES: &str = "the values of the effective matrix";
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -35,23 +33,11 @@ const VALUES: &str = "the values of the effective matrix";
 /// with the values there after contact.
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
-    /// (w_ū, w_v̄, w_ā): stages with the same weights share the operator.
-    weights: [f64; 3],
-    tangent: Tangent,
-    linearity: Linearity,
-    combination: Combination,
-    /// Values of the system's tangent and of the effective matrix, kept where the tangent changes.
-    part: Vec<T>,
-    /// The part of the tangent that is evaluated at the end of a path.
-    end: Vec<T>,
-    values: Vec<T>,
+    matrix: EffectiveMatrix<T>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
     responses: Responses<T>,
-    /// For a diagonal matrix its reciprocals, the responses of the interface to unit forces; empty until needed.
-    reciprocals: Vec<T>,
-    /// The response of a diagonal matrix to a row.
-    spread: SpreadRow<T>,
+    diagonal: DiagonalResponses<T>,
     /// Version of the rows that the Delassus operator belongs to.
     rows: u64,
     delassus: Delassus<T>,
@@ -61,6 +47,15 @@ pub(crate) struct Operator<T> {
     whole: bool,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
+}
+
+/// The responses of a diagonal matrix.
+#[derive(Debug)]
+struct DiagonalResponses<T> {
+    /// The responses of the interface to unit forces; empty until needed.
+    reciprocals: Vec<T>,
+    /// The response to a row.
+    spread: SpreadRow<T>,
 }
 
 impl<T: Real> Operator<T> {
@@ -74,13 +69,10 @@ impl<T: Real> Operator<T> {
         at: At<'_, T>,
         (interface, unit): (&[usize], Unit),
     ) -> Result<Self> {
-        let (tangent, mut combination) = pattern(system, weights)?;
-        let linearity = system.linearity();
-        let varies = tangent == Tangent::Present && linearity == Linearity::Nonlinear;
-        let (factor, contact) = analyze(solver, combination.pattern(), interface, varies)?;
-        if !varies && tangent == Tangent::Present {
-            combination.leave_pattern();
-        }
+        let mut matrix = EffectiveMatrix::new(system, weights)?;
+        let varies = matrix.varies();
+        let (factor, contact) = analyze(solver, matrix.pattern(), interface, varies)?;
+        matrix.leave_pattern();
         let full = match contact {
             ContactPath::Full if !interface.is_empty() => {
                 memory::zeros(COLUMNS, system.dofs(), "the responses of the contact rows")?
@@ -89,18 +81,14 @@ impl<T: Real> Operator<T> {
         };
         let unit = if varies { Unit::Row } else { unit };
         let mut operator = Self {
-            weights,
-            tangent,
-            linearity,
-            combination,
-            part: Vec::new(),
-            end: Vec::new(),
-            values: Vec::new(),
+            matrix,
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
-            spread: SpreadRow::new(if contact == ContactPath::Apart { interface.len() } else { 0 }),
+            diagonal: DiagonalResponses {
+                reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
+                spread: SpreadRow::new(if contact == ContactPath::Apart { interface.len() } else { 0 }),
+            },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
@@ -126,18 +114,11 @@ impl<T: Real> Operator<T> {
     /// not factorized again. Responses are kept for each `unit`.
     pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize], unit: Unit) -> Result<Self> {
         Ok(Self {
-            weights: [f64::NAN; 3],
-            tangent: Tangent::Absent,
-            linearity: Linearity::Linear,
-            combination: Combination::diagonal(0, &[], &[])?,
-            part: Vec::new(),
-            end: Vec::new(),
-            values: Vec::new(),
+            matrix: EffectiveMatrix::none()?,
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            reciprocals: Vec::new(),
-            spread: SpreadRow::default(),
+            diagonal: DiagonalResponses { reciprocals: Vec::new(), spread: SpreadRow::default() },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
@@ -149,12 +130,12 @@ impl<T: Real> Operator<T> {
 
     /// Whether stages with these weights can use it.
     pub(crate) fn serves(&self, weights: [f64; 3]) -> bool {
-        self.weights.map(f64::to_bits) == weights.map(f64::to_bits)
+        self.matrix.has_weights(weights)
     }
 
     /// Whether the matrix changes with u and v.
     pub(crate) fn varies(&self) -> bool {
-        self.tangent == Tangent::Present && self.linearity == Linearity::Nonlinear
+        self.matrix.varies()
     }
 
     /// Factorizes for the step size h with the tangent at a motion, and forgets responses. Where the matrix varies,
@@ -162,52 +143,10 @@ impl<T: Real> Operator<T> {
     ///
     /// After an error the factor is not usable until a factorization has succeeded.
     pub(crate) fn factorize(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
-        let Self { weights, tangent, linearity, combination, factor, part, end: at_end, values, .. } = self;
-        check_sources(&*system, *tangent, combination)?;
-        memory::grow(values, combination.len(), 1, VALUES)?;
-        if *tangent == Tangent::Present {
-            memory::grow(part, system.pattern().row_idx().len(), 1, VALUES)?;
-            let weights = TangentWeights { stiffness: T::of(weights[0]), damping: T::of(weights[1] / h) };
-            match at.of {
-                TangentOf::State => system.tangent(at.t, at.u, at.v, weights, part)?,
-                TangentOf::Path(path) => match system.path_force() {
-                    Some(own) => own.tangent_along(at.t, path, at.v, weights, part)?,
-                    None => system.tangent(at.t, path.mean, at.v, weights, part)?,
-                },
-                TangentOf::Simpson { end } => {
-                    // Twice the derivative of ⅙ f(u) + ⅔ f(½ (u + u')) + ⅙ f(u') by u', in which the middle term
-                    // counts half: ⅔ K in the middle and ⅓ K at the end.
-                    let third = weights.stiffness / T::of(3.0);
-                    memory::grow(at_end, part.len(), 1, VALUES)?;
-                    let of_end = TangentWeights { stiffness: third, damping: T::zero() };
-                    system.tangent(at.t, end, at.v, of_end, at_end)?;
-                    let of_middle = TangentWeights { stiffness: third + third, ..weights };
-                    system.tangent(at.t, at.u, at.v, of_middle, part)?;
-                    T::axpy(T::one(), at_end, part);
-                }
-            }
-        }
-        let inertia = T::of(weights[2] / (h * h));
-        let own = (T::one(), &part[..]);
-        match (system.mass(), *tangent) {
-            (Mass::Lumped(mass), Tangent::Present) => combination.fill(&[own], Some((inertia, mass)), values),
-            (Mass::Lumped(mass), Tangent::Absent) => combination.fill(&[], Some((inertia, mass)), values),
-            (Mass::Consistent(mass), Tangent::Present) => combination.fill(&[own, (inertia, mass.val())], None, values),
-            (Mass::Consistent(mass), Tangent::Absent) => combination.fill(&[(inertia, mass.val())], None, values),
-        }
-        // The factorization takes the most memory of a build: values that are not read again are freed before.
-        if *tangent == Tangent::Absent || *linearity == Linearity::Linear {
-            *part = Vec::new();
-        }
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let pattern = combination.shape(system.pattern());
-            let column = pattern.col_ptr().partition_point(|&p| p <= at) - 1;
-            let (row, value) = (pattern.row_idx()[at], values[at].value());
-            return Err(Error::MatrixNotFinite { matrix: "effective", row, column, value });
-        }
-        factor.factorize(SparseColMatRef::new(combination.shape(system.pattern()), values))?;
+        self.matrix.assemble(system, h, at)?;
+        self.factor.factorize(self.matrix.view(system))?;
         if !self.varies() {
-            self.values = Vec::new();
+            self.matrix.free_values();
             self.factor.release();
         }
         self.reset();
@@ -283,8 +222,7 @@ impl<T: Real> Operator<T> {
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
     /// `versions` is the number of versions so far.
     ///
-    /// The compliance of a power law at first touch is infinite. It is limited to ε⁻⁴ times the diagonal entry of W:
-    /// the effect of such a spring is lost to rounding, whatever the unit.
+    /// The compliance of a power law at first touch is infinite. It is limited by a multiple of the diagonal entry of W.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,
@@ -299,8 +237,7 @@ impl<T: Real> Operator<T> {
             self.assemble(g, rows, is_known)?;
         }
         let Delassus { values, diagonal, version, .. } = &mut self.delassus;
-        let square = T::epsilon() * T::epsilon();
-        let most = (square * square).recip();
+        let most = largest_compliance::<T>();
         for (k, &own) in diagonal.iter().enumerate() {
             let entry = &mut values[k * rows.len() + k];
             let most = if own > T::zero() { most * own } else { T::infinity() };
@@ -318,7 +255,7 @@ impl<T: Real> Operator<T> {
     /// Forms W of some rows, without compliances, from the W of other rows if it is known.
     fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], is_known: bool) -> Result<()> {
         self.prepare(g, rows)?;
-        let Self { delassus, responses, reciprocals, spread, .. } = self;
+        let Self { delassus, responses, diagonal: DiagonalResponses { reciprocals, spread }, .. } = self;
         let size = rows.len();
         match self.contact {
             ContactPath::Apart => {
@@ -350,7 +287,8 @@ impl<T: Real> Operator<T> {
 
     /// Computes responses to unit forces on all dofs that some rows act on.
     fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
-        let Self { contact, factor, interface, full, responses, reciprocals, spread, .. } = self;
+        let Self { contact, factor, interface, full, responses, diagonal, .. } = self;
+        let DiagonalResponses { reciprocals, spread } = diagonal;
         if *contact == ContactPath::Apart {
             if reciprocals.is_empty() {
                 reciprocals.resize(interface.len(), T::one());
@@ -380,7 +318,7 @@ impl<T: Real> Operator<T> {
             response.fill(T::zero());
             for (&row, &lambda) in rows.iter().zip(multipliers) {
                 for (place, weight) in g.located(row) {
-                    response[place] += lambda * (weight * self.reciprocals[place]);
+                    response[place] += lambda * (weight * self.diagonal.reciprocals[place]);
                 }
             }
             return;
@@ -396,13 +334,7 @@ impl<T: Real> Operator<T> {
 
     /// The magnitude of the diagonal of W, as if each dof moved with all other dofs held.
     pub(crate) fn scale(&self, g: &ContactJacobian<T>, rows: &[usize], scale: &mut Vec<T>) {
-        let pattern = self.combination.pattern();
-        let diagonal = |place: usize| {
-            let dof = self.interface[place];
-            let range = pattern.col_range(dof);
-            let at = pattern.row_idx()[range.clone()].binary_search(&dof);
-            at.map_or(T::zero(), |at| self.values[range.start + at])
-        };
+        let diagonal = |place: usize| self.matrix.diagonal(self.interface[place]);
         scale.clear();
         scale.extend(
             rows.iter().map(|&row| g.located(row).map(|(place, weight)| weight * weight / diagonal(place)).sum::<T>()),
@@ -441,7 +373,7 @@ impl<T: Real> Operator<T> {
     /// Forgets results computed with another matrix.
     fn reset(&mut self) {
         self.responses.reset();
-        self.reciprocals.clear();
+        self.diagonal.reciprocals.clear();
         self.delassus.version = 0;
     }
 

@@ -2,16 +2,21 @@
 //!
 //! - `constraints`, `part`, `laws`: all constraints as one list of rows, each constraint with its dofs, and their laws.
 //! - `gaps`, `rate_differences`: gaps of all rows and their rates.
-//! - `kept_depths`: limits the penetration recovered in a step.
+//! - `gap_offsets`: overlaps at the start, and the limit of penetration recovered in a step.
 //! - `contact_rows`: the quantity that each gap row constrains in a stage; `slip`: the same for tangential rows;
-//!   `curved_rows`: gaps that are not linear in the displacements.
+//!   `curved_rows`: gaps that are not linear in the displacements; `massless_rows`: rows on dofs without mass.
+//! - `row_state`: whether a row may carry a force, is in the contact problem, and is closed.
+//! - `problem_rows`: the rows of the contact problem, and its data.
 
 pub(super) mod constraints;
 pub(super) mod contact_rows;
 pub(super) mod curved_rows;
+pub(super) mod gap_offsets;
 pub(super) mod gaps;
-pub(super) mod kept_depths;
 pub(super) mod laws;
+pub(super) mod massless_rows;
 pub(super) mod part;
+pub(super) mod problem_rows;
 pub(super) mod rate_differences;
+pub(super) mod row_state;
 pub(super) mod slip;

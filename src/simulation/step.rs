@@ -1,5 +1,6 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything unchanged.
 //!
+//! - `stages`: the stages of the step.
 //! - `jumps`: contacts that close or open, and friction that changes.
 //! - `finite`: the check before a state is accepted.
 //! - `judge`: whether a step is fine enough; `control`: repeats refused steps.
@@ -10,31 +11,21 @@ pub(super) mod finite;
 pub(super) mod judge;
 pub(super) mod jumps;
 pub(super) mod resample;
+pub(super) mod stages;
 
-use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Correction, Corrector, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::real::Real;
-use crate::simulation::build::program::CompiledStage;
-use crate::simulation::build::workspace::{CorrectionWork, Workspace};
-use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::rows::contact_rows::Part;
-use crate::simulation::rows::slip::note_slips_of_state;
+use crate::simulation::rows::slip::store_slips_of_state;
 use crate::simulation::run::Simulation;
-use crate::simulation::stage::StageSolve;
-use crate::simulation::stage::contact::closing::Booking;
-use crate::simulation::stage::contact::{ContactStep, ContactWork};
-use crate::simulation::stage::massless_step::difference;
-use crate::simulation::stage::vectors::predict;
+use crate::simulation::stage::contact::ContactWork;
 use crate::simulation::step::finite::{Extent, check_contacts, check_motion};
 use crate::simulation::step::judge::Verdict;
 use crate::simulation::step::jumps::{friction_jumps, jumps, note_exerting};
 use crate::simulation::watch::energy::StepBooks;
 use crate::simulation::watch::stiffening::Taken;
-use crate::state::{Clock, History, Motion};
-use crate::tableau::impulse_weight;
+use crate::state::History;
 
 impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
@@ -57,7 +48,7 @@ impl<T: Real> Simulation<'_, T> {
             contact_solver.reserve(constraints.room());
         }
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
-        constraints.measure_from_kept(&mut work.contact.trial.gap);
+        constraints.add_kept(&mut work.contact.trial.gap);
         if let Some(ledger) = ledger {
             ledger.begin((constraints, g), state, &work.contact.trial.lambda)?;
         }
@@ -74,7 +65,7 @@ impl<T: Real> Simulation<'_, T> {
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         work.backup.underway = true;
         let result = self
-            .stages()
+            .take_stages()
             .and_then(|()| self.check_stability())
             .and_then(|()| self.inspect())
             .and_then(|()| self.accept());
@@ -122,7 +113,7 @@ impl<T: Real> Simulation<'_, T> {
         let Self { constraints, g, history, work, program, startup, .. } = self;
         let [new, past @ ..] = &history.slots[..] else { return Ok(()) };
         let ahead = startup.as_ref().unwrap_or(program).stages.last().and_then(|stage| stage.contact.as_ref());
-        note_slips_of_state((constraints, g), new, ahead, &mut work.contact)?;
+        store_slips_of_state((constraints, g), new, ahead, &mut work.contact)?;
         // If correctors have edited the start of the step, it is the edited one.
         let (start, closed) =
             (&past[work.backup.rotations - 1], [&work.contact.closed_at_start[..], &work.contact.trial.closed]);
@@ -211,7 +202,7 @@ impl<T: Real> Simulation<'_, T> {
         history.slots[1..].rotate_left(stages - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.shown, &mut work.shown);
-        constraints.measure_from_surfaces(&mut work.contact.trial.gap);
+        constraints.subtract_kept(&mut work.contact.trial.gap);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
         work.contact.impulses.accept();
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);
@@ -240,181 +231,10 @@ impl<T: Real> Simulation<'_, T> {
         }
         Ok(Verdict::Accepted)
     }
-
-    /// All stages of a step. On entry slot 0 of the history holds the current motion.
-    fn stages(&mut self) -> Result<()> {
-        let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, together, .. } = self;
-        let (program, start_covector) = match &mut self.startup {
-            // After the step one more state is known than now.
-            Some(startup) => (startup, Some(&self.scheme.derived.covectors[history.known])),
-            None => (&mut self.program, None),
-        };
-        let clock = history.clock;
-        for (stages_before, stage) in program.stages.iter().enumerate() {
-            let covector = start_covector.unwrap_or(&stage.covector);
-            history.slots.rotate_right(1);
-            work.backup.rotations += 1;
-            let Some((new, past)) = history.slots.split_first_mut() else { continue };
-            new.t = clock.at(stage.end);
-            let operator = &mut program.operators[stage.operator];
-            operator.follow(constraints.version());
-            predict(stage, clock, &mut **system, new, past, &mut work.vectors)?;
-            let is_first = stages_before == 0;
-            let (rows, motions, at) = ((&mut *constraints, &*g), (&mut *new, &*past), (stage, clock, is_first));
-            begin_corrections(work, correctors, &mut **contact_solver, rows, at, motions)?;
-            if let Some(excess) = &mut work.excess {
-                excess.begin(is_first);
-                excess.shift(stage, clock.h, new);
-            }
-            work.contact.rows.read_start(constraints, g, past, clock.h)?;
-            let (parts, solver) = (&mut **system, &mut **contact_solver);
-            let mut solve =
-                StageSolve { stage, clock, system: parts, together, operator, constraints, g, solver, statistics };
-            let (vectors, contact) = (&mut work.vectors, &mut work.contact);
-            match (&mut work.newton, &mut work.block) {
-                (Some(newton), None) => solve.by_iteration(newton, new, past, vectors, contact)?,
-                (_, block) => solve.directly(block.as_mut(), new, past, vectors, contact)?,
-            }
-            if let (Some(excess), Some(projection)) = (&mut work.excess, &mut work.correction.projection) {
-                let switching = &mut *work.correction.buffers.switching;
-                work.correction.energy +=
-                    excess.solve_again(&mut solve, (new, past), (vectors, contact), (switching, projection))?;
-            }
-            for (&dof, support) in work.vectors.supports.dofs.iter().zip(&work.vectors.supports.state) {
-                new.a[dof] = support[2];
-            }
-            if let (Some(start), false) = (past.get(stages_before), work.massless.is_empty()) {
-                let intervals = [clock.h * stage.end, history.made_with];
-                difference(&work.massless, &history.slopes, &start.u, intervals, new);
-            }
-            if constraints.len() > 0 {
-                let solver = &mut **contact_solver;
-                let part = if work.block.is_some() { Part::Massive } else { Part::All };
-                let mut contact = ContactStep { stage, clock, constraints, g, solver, statistics, iterate: None, part };
-                let booking = Booking {
-                    impulse_weight: impulse_weight(stage.response, covector),
-                    is_first,
-                    is_last: stages_before + 1 == program.stages.len(),
-                };
-                contact.close(
-                    (new, past),
-                    &booking,
-                    &work.massless,
-                    &mut work.correction.buffers,
-                    &mut work.contact,
-                )?;
-                if let Some(excess) = &work.excess {
-                    excess.book(stage, clock.h, &work.correction.buffers.switching, &mut work.contact.trial);
-                }
-                if let Some(projection) =
-                    work.correction.projection.as_mut().filter(|_| work.correction.buffers.has_touched())
-                {
-                    refresh(projection, &mut work.correction.projected_rows, constraints.version());
-                    let mut correction = Correction {
-                        h: clock.h,
-                        t: new.t,
-                        scheme: numbers(stage, covector, [stages_before, program.stages.len()]),
-                        g,
-                        projection,
-                        operator,
-                        block: work.block.as_mut(),
-                        solver: &mut **contact_solver,
-                        system: Erased(&mut **system),
-                        constraints: ErasedGaps(constraints),
-                        new,
-                        past,
-                        backup: &mut work.backup,
-                        contacts: &mut work.contact.trial,
-                        was_closed: &work.contact.was_closed,
-                        closed_at_start: &work.contact.closed_at_start,
-                        was_sticking: &work.contact.was_sticking,
-                        massless: &work.massless,
-                        prescribed: &work.vectors.supports.dofs,
-                        buffers: &mut work.correction.buffers,
-                        energy: &mut work.correction.energy,
-                    };
-                    correction.correct(correctors)?;
-                }
-                work.contact.impulses.push_corrections(g, &work.contact.trial);
-            }
-        }
-        Ok(())
-    }
 }
 
 /// How far ahead a step looks, and its share of a whole step.
 fn extent<T: Real>(ahead: f64, history: &History<T>) -> (f64, f64) {
     let (h, whole) = (history.clock.h, history.pace.nominal.max(history.made_with));
     (ahead * h, (h / whole).min(1.0))
-}
-
-/// Begins the corrections of a stage; correctors with a prediction act on its predicted motion.
-fn begin_corrections<T: Real>(
-    work: &mut Workspace<T>,
-    correctors: &[Box<dyn Corrector<T> + '_>],
-    solver: &mut dyn ContactSolver<T>,
-    (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
-    (stage, clock, is_first): (&CompiledStage<T>, Clock, bool),
-    (new, past): (&mut Motion<T>, &[Motion<T>]),
-) -> Result<()> {
-    let CorrectionWork { buffers, projection, projected_rows, shifted, .. } = &mut work.correction;
-    let (Some(projection), Some(start)) = (projection, past.first()) else { return Ok(()) };
-    refresh(projection, projected_rows, constraints.version());
-    buffers.begin(&work.contact.trial, is_first);
-    if shifted.is_empty() {
-        return Ok(());
-    }
-    let mut prediction = Prediction {
-        h: clock.h * stage.end,
-        t: new.t,
-        balance_share: balance_share(stage),
-        g,
-        projection,
-        solver,
-        constraints: ErasedGaps(constraints),
-        start,
-        new,
-        balance: work.vectors.balance.as_mut().filter(|_| stage.balance.is_some()),
-        was_closed: &work.contact.trial.closed,
-        massless: &work.massless,
-        prescribed: &work.vectors.supports.dofs,
-        ids: &work.contact.trial.ids,
-        buffers,
-        shifted,
-    };
-    correctors.iter().try_for_each(|corrector| corrector.predict(&mut prediction))
-}
-
-/// Resets a projection made for rows of another version.
-fn refresh<T: Real>(projection: &mut JumpProjection<T>, known: &mut u64, version: u64) {
-    if *known != version {
-        *known = version;
-        projection.reset();
-    }
-}
-
-/// The displacement of the balance per displacement of the state, as functions of the unknown.
-fn balance_share<T: Real>(stage: &CompiledStage<T>) -> T {
-    let [state, balance] = [stage.recovery.weights()[0], stage.balanced().weights()[0]];
-    if state == T::zero() { T::zero() } else { balance / state }
-}
-
-/// The numbers of a stage that a correction needs; the stage is number `place` of `stages`.
-fn numbers<'s, T: Real>(
-    stage: &'s CompiledStage<T>,
-    covector: &'s [[f64; 3]],
-    [place, stages]: [usize; 2],
-) -> Scheme<'s> {
-    Scheme {
-        response: stage.response,
-        acceleration: stage.acceleration,
-        balance: stage.balance_acceleration,
-        covector,
-        read: &stage.read,
-        reads_acceleration: stage.reads_acceleration,
-        keeps_balance: stage.keeps_balance,
-        stage: place,
-        stages,
-        length: stage.end - stage.start,
-    }
 }

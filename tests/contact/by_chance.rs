@@ -103,21 +103,3 @@ fn what_was_found_is_found_no_more() {
     ];
     check(named(&FOUND), |_, _, figures| figures.findings.first().cloned().or(growth(figures)));
 }
-
-/// Rows that turn with their own forces come nearer to rest from one linearization to the next by a factor of up to
-/// 0.99, or go away from it by 1.01: such scenes once ended with `Error::Contact`, or by way of Newton's method.
-#[test]
-fn rows_that_turn_with_their_forces_find_rest() {
-    const ENDED: [(&str, u64); 6] = [
-        ("BodyContact, of itself, three bodies, 3-D", 375),
-        ("BodyContact, of itself, a body that folds, 3-D", 563),
-        ("EdgeToEdge, beside mortar, 3-D", 159),
-        ("Mortar, plain, 3-D", 329),
-        ("Mortar, plain, 3-D", 332),
-        ("Mortar, plain, 3-D", 458),
-    ];
-    check(named(&ENDED), |_, _, figures| {
-        let ended = figures.refused.as_ref().map(|(name, words)| format!("ended, {name}: {words}"));
-        figures.findings.first().cloned().or(ended).or(growth(figures))
-    });
-}

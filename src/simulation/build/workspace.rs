@@ -12,7 +12,6 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::contact_rows::ContactRowsWork;
 use crate::simulation::run::impulses::Impulses;
 use crate::simulation::stage::contact::ContactWork;
-use crate::simulation::stage::contact::mixing::Mixing;
 use crate::simulation::stage::excess_forces::ExcessForces;
 use crate::simulation::stage::massless::{MasslessBlock, is_damped};
 use crate::simulation::stage::newton::NewtonWork;
@@ -65,16 +64,15 @@ pub(crate) struct ContactSize {
     pub(crate) entries: usize,
     /// Dofs that contact may ever act on.
     pub(crate) interface: usize,
-    /// Whether there may ever be a row, and whether rows may move within a step.
+    /// Whether there may ever be a row.
     pub(crate) may_press: bool,
-    pub(crate) curved: bool,
 }
 
 impl ContactSize {
     /// Sizes of the constraints, with memory for `rows` rows.
     pub(crate) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
         let (entries, interface) = (g.entries(), constraints.interface().len());
-        Self { rows, entries, interface, may_press: constraints.may_press(), curved: !constraints.is_affine() }
+        Self { rows, entries, interface, may_press: constraints.may_press() }
     }
 }
 
@@ -89,7 +87,7 @@ impl<T: Real> Workspace<T> {
         slots: usize,
     ) -> Self {
         let dofs = system.dofs();
-        let &ContactSize { rows, entries, interface, may_press, curved } = contact;
+        let &ContactSize { rows, entries, interface, may_press } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
         let balances = may_press && correctors.iter().any(|corrector| corrector.effects().corrects_massless);
         let edits_past = correctors.iter().any(|corrector| corrector.effects().edits == Edits::Past);
@@ -99,10 +97,8 @@ impl<T: Real> Workspace<T> {
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
         let supports = Supports::of(system);
         let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
-        if curved && may_press {
-            contact_rows.curved.mixing = Some(Box::new(Mixing::new(interface)));
-        }
-        contact_rows.slides_by_way = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        contact_rows.slips.by_displacement =
+            correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
         Self {
             contact: ContactWork {
                 interface: InterfaceWork::new(interface),
@@ -120,6 +116,7 @@ impl<T: Real> Workspace<T> {
                 increment: vec![T::zero(); dofs],
                 balance: separate_balance.then(|| Motion::zero(dofs)),
                 supports,
+                iterate: Vec::new(),
             },
             newton: None,
             massless: Vec::new(),
@@ -152,7 +149,7 @@ impl<T: Real> Workspace<T> {
     ) -> Result<()> {
         if let Some(name) = follower {
             self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
-            self.contact.rows.on_massless = vec![false; self.rows];
+            self.contact.rows.massless.acts = vec![false; self.rows];
         } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
             self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
         }
@@ -166,7 +163,7 @@ impl<T: Real> Workspace<T> {
             let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
             buffers.damps_massless = damps > 0.0;
         }
-        self.contact.rows.massless.clone_from(&massless);
+        self.contact.rows.massless.dofs.clone_from(&massless);
         self.massless = massless;
         Ok(())
     }

@@ -8,7 +8,7 @@ pub(crate) struct InterfaceWork<T> {
     pub(crate) increment: Vec<T>,
     /// Forces of contact, and forces of the contact problem that is being solved.
     pub(crate) forces: Vec<T>,
-    pub(crate) pressing: Vec<T>,
+    pub(crate) problem_forces: Vec<T>,
     /// Values at d = 0 of the displacements of the state and of the balance if it differs, and of the target of
     /// contact.
     pub(crate) displacement: Vec<T>,
@@ -18,7 +18,7 @@ pub(crate) struct InterfaceWork<T> {
     pub(crate) free: Vec<T>,
     pub(crate) tried: Vec<T>,
     /// Displacements where the gaps of curved rows were linearized last.
-    pub(crate) followed: Vec<T>,
+    pub(crate) linearized_at: Vec<T>,
     /// A response: of the multipliers of a contact problem, or of forces that do not depend on d.
     pub(crate) response: Vec<T>,
 }
@@ -29,13 +29,13 @@ impl<T: Real> InterfaceWork<T> {
         Self {
             increment: zero(),
             forces: zero(),
-            pressing: zero(),
+            problem_forces: zero(),
             displacement: zero(),
             balance: zero(),
             target: zero(),
             free: zero(),
             tried: zero(),
-            followed: zero(),
+            linearized_at: zero(),
             response: zero(),
         }
     }

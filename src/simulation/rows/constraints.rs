@@ -8,11 +8,10 @@ use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::build::admitted::Admitted;
-use crate::simulation::rows::kept_depths::recovery_of;
+use crate::simulation::rows::gap_offsets::GapOffsets;
 use crate::simulation::rows::laws::Laws;
 use crate::simulation::rows::part::{Local, Part, gather, of};
 use crate::simulation::rows::rate_differences::RateDifferences;
-use crate::simulation::start::overclosures::Overclosures;
 use crate::state::{ContactState, Motion, Names};
 
 /// The constraints in the order given, their rows one after the other.
@@ -21,38 +20,48 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) ids: Vec<ContactId>,
     pub(crate) laws: Laws,
     pub(crate) tangents: Tangents,
-    /// The tangents before the rows were read again.
-    old_tangents: Tangents,
     pub(crate) magnitudes: Vec<T>,
-    pub(crate) recoveries: Vec<T>,
-    /// Rows and rates of a constraint that is evaluated at another motion.
-    pub(crate) scratch: Contacts<T>,
-    pub(crate) rates: Vec<GapRates<T>>,
-    pub(crate) slip_rates: Vec<GapRates<T>>,
-    pub(crate) local: Local<T>,
-    /// The free dofs that contact may ever act on, ascending.
-    interface: Vec<usize>,
+    pub(crate) offsets: GapOffsets<T>,
+    interface: Interface,
+    admitted: Admitted,
+    pub(crate) reading: Reading,
+    /// Number of rows to reserve memory for.
+    room: usize,
+    /// Time by which the last search looked ahead.
+    pub(crate) ahead: f64,
+    pub(crate) scratch: Scratch<T>,
+}
+
+/// The dofs that contact may ever act on.
+struct Interface {
+    /// The free ones, ascending.
+    dofs: Vec<usize>,
     /// Interface index of each dof of the system; `UNKNOWN` or `NO_RESPONSE` for dofs that are not on the interface.
     places: Vec<usize>,
-    admitted: Admitted,
+}
+
+/// Whether the rows have to be read again, and how often they have been.
+pub(crate) struct Reading {
     /// Whether candidates have changed since the rows were last read.
     pub(crate) stale: bool,
     /// Number of times the rows have been read, and version of their names.
     version: u64,
     names: Names,
-    /// Number of rows to reserve memory for.
-    room: usize,
-    /// Time by which the last search looked ahead.
-    pub(crate) ahead: f64,
+    /// The tangents before the rows were read again.
+    old_tangents: Tangents,
+}
+
+/// Memory for the evaluation of constraints.
+pub(crate) struct Scratch<T> {
+    /// Rows and rates of a constraint that is evaluated at another motion.
+    pub(crate) contacts: Contacts<T>,
+    pub(crate) rates: Vec<GapRates<T>>,
+    pub(crate) slip_rates: Vec<GapRates<T>>,
+    pub(crate) local: Local<T>,
     pub(crate) differences: RateDifferences<T>,
     /// Bonds that break in a step, and features of all broken bonds of one constraint.
     overloads: Vec<(usize, f64)>,
     features: Vec<usize>,
-    /// Offsets added to gaps that were negative at the start: by feature, and by row (empty if there are none).
-    pub(crate) overclosures: Option<Overclosures<T>>,
-    pub(crate) added: Vec<T>,
-    /// Offsets added to gaps in the current step (empty if there are none).
-    pub(crate) kept: Vec<T>,
 }
 
 /// The interface index of a dof on which no constraint may act.
@@ -133,27 +142,22 @@ impl<'a, T: Real> Constraints<'a, T> {
             ids: Vec::with_capacity(room),
             laws: Laws::with_capacity(room),
             tangents: Tangents::default(),
-            old_tangents: Tangents::default(),
             magnitudes: Vec::with_capacity(room),
-            recoveries: Vec::with_capacity(room),
-            scratch,
-            rates: vec![GapRates::default(); room],
-            slip_rates: Vec::new(),
-            local,
-            interface,
-            places,
+            offsets: GapOffsets::with_capacity(room),
+            interface: Interface { dofs: interface, places },
             admitted,
-            stale: true,
-            version: 0,
-            names: Names::default(),
+            reading: Reading { stale: true, version: 0, names: Names::default(), old_tangents: Tangents::default() },
             room,
             ahead: 0.0,
-            differences: RateDifferences::default(),
-            overloads: Vec::new(),
-            features,
-            overclosures: None,
-            added: Vec::new(),
-            kept: Vec::new(),
+            scratch: Scratch {
+                contacts: scratch,
+                rates: vec![GapRates::default(); room],
+                slip_rates: Vec::new(),
+                local,
+                differences: RateDifferences::default(),
+                overloads: Vec::new(),
+                features,
+            },
         };
         Ok((constraints, ContactJacobian::default()))
     }
@@ -186,23 +190,23 @@ impl<'a, T: Real> Constraints<'a, T> {
         ahead: f64,
         jacobian: &mut ContactJacobian<T>,
     ) -> Result<Candidates> {
-        let Self { parts, local, stale, .. } = self;
+        let Self { parts, scratch: Scratch { local, .. }, reading, .. } = self;
         for (number, part) in parts.iter_mut().enumerate().filter(|(_, part)| part.variation != Variation::Never) {
             let (u, v) = (gather(&part.dofs, &motion.u, &mut local.u), gather(&part.dofs, &motion.v, &mut local.v));
-            part.settle(motion.t, u);
+            part.store_place(motion.t, u);
             let found = part.constraint.search(motion.t, u, v, ahead).map_err(|error| of(number, error))?;
             // The flag stays set if a later part fails: the next successful search reads the rows again.
             part.stale |= found == Candidates::Changed;
-            *stale |= part.stale;
+            reading.stale |= part.stale;
         }
         self.ahead = ahead;
-        self.kept.clear();
+        self.offsets.clear_kept();
         self.read_stale(jacobian)
     }
 
     /// Lets every constraint inspect the step that is about to be accepted.
     pub(crate) fn inspect(&mut self, [from, to]: [&Motion<T>; 2], closed: [&[bool]; 2]) -> Result<()> {
-        let Self { parts, local, .. } = self;
+        let Self { parts, scratch: Scratch { local, .. }, .. } = self;
         let mut rest = closed;
         for (number, part) in parts.iter_mut().enumerate() {
             let count = part.contacts.len();
@@ -221,7 +225,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Breaks the bonds that cannot carry the forces of a step that ends at t, and appends them to `broken`.
     pub(crate) fn break_bonds(&mut self, forces: &[T], t: f64, broken: &mut Vec<BrokenBond>) {
-        let Self { parts, overloads, features, stale, .. } = self;
+        let Self { parts, scratch: Scratch { overloads, features, .. }, reading, .. } = self;
         let mut rest = forces;
         for (number, part) in parts.iter_mut().enumerate() {
             let (own, others) = rest.split_at(part.contacts.len());
@@ -234,7 +238,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             broken.extend(overloads.iter().map(|&overload| BrokenBond::new(number, overload, t)));
             list_features(number, broken, features);
             part.constraint.set_broken(features);
-            (part.stale, *stale) = (true, true);
+            (part.stale, reading.stale) = (true, true);
         }
     }
 
@@ -245,14 +249,14 @@ impl<'a, T: Real> Constraints<'a, T> {
             // The flag stays set after an error, as in a search.
             let changed = !matches!(moved, Ok(Candidates::Unchanged));
             self.parts[number].stale |= changed;
-            self.stale |= changed;
+            self.reading.stale |= changed;
             moved?;
         }
         self.read_stale(jacobian)
     }
 
     pub(crate) fn follow_part(&mut self, number: usize, t: f64, u: &[T]) -> Result<Candidates> {
-        let Self { parts, local, .. } = self;
+        let Self { parts, scratch: Scratch { local, .. }, .. } = self;
         let part = &mut parts[number];
         if part.variation != Variation::Follows {
             return Ok(Candidates::Unchanged);
@@ -272,7 +276,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// The version of the rows. Results computed from rows of another version are out of date.
     pub(crate) fn version(&self) -> u64 {
-        self.version
+        self.reading.version
     }
 
     /// Whether the constraint of a row has not changed its rows since a version.
@@ -282,12 +286,12 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// The names of all rows, and their version.
     pub(crate) fn named(&self) -> (&[ContactId], Names) {
-        (&self.ids, self.names)
+        (&self.ids, self.reading.names)
     }
 
     /// Reads the rows if they may have changed.
     fn read_stale(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<Candidates> {
-        if !self.stale {
+        if !self.reading.stale {
             return Ok(Candidates::Unchanged);
         }
         self.read_rows(jacobian)?;
@@ -296,19 +300,20 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses rows that do not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, magnitudes, recoveries, places, admitted, .. } = self;
+        let Self { parts, ids, laws, magnitudes, offsets, interface, admitted, reading, .. } = self;
+        let (places, names) = (&interface.places, &mut reading.names);
         jacobian.clear();
         laws.clear();
         magnitudes.clear();
-        recoveries.clear();
-        self.stale = true;
+        offsets.clear_rows();
+        reading.stale = true;
         for (constraint, part) in parts.iter_mut().enumerate() {
             let Part { contacts, dofs, .. } = part;
             if part.stale {
                 (part.rates, part.slip_rates) = (None, None);
                 contacts.clear();
                 part.constraint.contacts(contacts);
-                part.version = self.version + 1;
+                part.version = reading.version + 1;
             }
             for row in 0..contacts.len() {
                 let (feature, candidate) = contacts.name(row);
@@ -329,7 +334,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                     return Err(Error::NotFinite { what, index: laws.len() - 1, value });
                 }
                 magnitudes.push(magnitude);
-                recoveries.push(recovery_of(contacts.recovery(row), law)?);
+                offsets.push(contacts.recovery(row), law)?;
                 check_entries(contacts.row(row), (dofs, places), contact, "a weight of a contact row (by dof)")?;
             }
             jacobian.append(contacts.rows(), dofs);
@@ -339,22 +344,23 @@ impl<'a, T: Real> Constraints<'a, T> {
             ids.truncate(laws.len());
         }
         self.read_tangents(jacobian)?;
-        jacobian.locate(&self.places);
+        jacobian.locate(&self.interface.places);
         for part in &mut self.parts {
             part.stale = false;
         }
-        self.stale = false;
-        self.version += 1;
+        self.reading.stale = false;
+        self.reading.version += 1;
         if jacobian.rows() > self.room {
             self.room = jacobian.rows().max(2 * self.room);
         }
-        self.distribute();
+        self.offsets.distribute(&self.ids);
         Ok(())
     }
 
     /// Reads the tangential rows of contacts with friction, which follow the rows of all gaps.
     fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, tangents, old_tangents, places, admitted, .. } = self;
+        let Self { parts, ids, laws, tangents, interface, admitted, reading, .. } = self;
+        let (places, old_tangents) = (&interface.places, &mut reading.old_tangents);
         std::mem::swap(tangents, old_tangents);
         tangents.clear();
         if parts.iter().any(|part| part.contacts.has_friction()) {
@@ -380,38 +386,19 @@ impl<'a, T: Real> Constraints<'a, T> {
             }
         }
         if !tangents.has_rows_of(old_tangents) {
-            names.change();
+            reading.names.change();
         }
         Ok(())
     }
 
-    /// Adds the initial overclosures to the gaps from now on.
-    pub(crate) fn adjust(&mut self, overclosures: Overclosures<T>) {
-        self.overclosures = Some(overclosures);
-        self.distribute();
-    }
-
-    /// The overclosures given to [`adjust`](Self::adjust).
-    pub(crate) fn overclosures(&self) -> Option<&Overclosures<T>> {
-        self.overclosures.as_ref()
-    }
-
-    /// Finds the offset of the gap of each row.
-    fn distribute(&mut self) {
-        if let Some(overclosures) = &self.overclosures {
-            self.added.clear();
-            self.added.extend(self.ids.iter().map(|&id| overclosures.of(id)));
-        }
-    }
-
     /// The free dofs that contact may ever act on, ascending.
     pub(crate) fn interface(&self) -> &[usize] {
-        &self.interface
+        &self.interface.dofs
     }
 
     /// The interface index of a dof; none for a prescribed dof, and for a dof that contact never acts on.
     pub(crate) fn place(&self, dof: usize) -> Option<usize> {
-        Some(self.places[dof]).filter(|&place| place < self.interface.len())
+        Some(self.interface.places[dof]).filter(|&place| place < self.interface.dofs.len())
     }
 
     /// The laws of all rows.

@@ -8,40 +8,15 @@
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
+use crate::rounding::{ALTERNATING_FORCES, ALTERNATING_GAPS, ALTERNATION, SAME_ROWS, rounding};
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::stage::contact::mixing::Mixing;
 
 /// Maximum number of linearizations of curved rows.
-pub(crate) const FOLLOWED: usize = 48;
+pub(crate) const LINEARIZATIONS: usize = 48;
 
 /// Number of linearizations after which rows may alternate: a node on an edge has the normal of one side or the
 /// other, and either pushes it to the other side.
 const LONG: usize = 12;
-
-/// Number of linearizations after which Anderson mixing starts. Nearly all stages converge or alternate before that.
-pub(crate) const SLOW: usize = 18;
-
-/// The relative [`Miss`] of gaps and forces at which the iteration has converged, in units of the rounding.
-const FIT: f64 = 64.0;
-
-/// The relative miss accepted once it no longer decreases.
-pub(crate) const NEAR: f64 = 1e-8;
-
-/// The miss of a gap, in multiples of its tolerance, accepted once it no longer decreases.
-pub(crate) const NOISE: f64 = 8.0;
-
-/// The relative miss of forces accepted after [`LONG`] linearizations if gaps miss by at most [`NEAR`].
-const TIRED: f64 = 1e-5;
-
-/// The relative miss of alternating forces accepted then: the angle between the two normals, which are both valid.
-const EDGE: f64 = 0.1;
-
-/// Rows alternate, and do not converge, if they miss by at least this share of the miss two linearizations before.
-const AGAIN: f64 = 0.999;
-
-/// The relative miss of gaps up to which rows alternate at an edge. Rows that do not converge on a curved surface
-/// miss gaps as much as forces.
-const AT_EDGE: f64 = 1e-6;
 
 /// Differences of gaps and forces between rows linearized at the result and the rows solved for.
 #[derive(Clone, Copy, Debug)]
@@ -64,10 +39,8 @@ pub(crate) struct Worst {
 
 impl Worst {
     pub(crate) fn of(miss: Miss, (row, what): (usize, &'static str)) -> Self {
-        match miss.force > miss.gap {
-            true => Self { row, what: "the force", change: miss.force, tolerance: TIRED },
-            false => Self { row, what, change: miss.gap, tolerance: NEAR },
-        }
+        let (what, change) = if miss.force > miss.gap { ("the force", miss.force) } else { (what, miss.gap) };
+        Self { row, what, change, tolerance: SAME_ROWS }
     }
 }
 
@@ -79,20 +52,18 @@ impl Miss {
         self.gap.max(self.force)
     }
 
-    /// Whether the iteration may end after `passes` linearizations: the miss is within rounding; or small and no
-    /// longer decreasing; or alternating; or small at the last linearization of a step that cannot be halved.
-    /// `before` and `earlier` are the misses of the last two linearizations.
-    pub(crate) fn is_settled<T: Real>(self, passes: usize, [before, earlier]: [Self; 2], may_halve: bool) -> bool {
-        let fit = FIT * T::epsilon().value();
+    /// Whether the iteration may end after some `linearizations`: the miss is within rounding; or small and no longer
+    /// decreasing; or rows alternate. `before` and `earlier` are the misses of the last two linearizations.
+    pub(crate) fn has_converged<T: Real>(self, linearizations: usize, [before, earlier]: [Self; 2]) -> bool {
+        let fit = rounding(T::one()).value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let force = if passes > LONG { TIRED } else { NEAR };
-        let near = within(NEAR, force) && (now > 0.25 * before.largest() || passes == FOLLOWED);
-        // With Anderson mixing a miss may repeat at random.
-        let alternates =
-            (LONG + 1..=SLOW).contains(&passes) && within(AT_EDGE, EDGE) && now >= AGAIN * earlier.largest();
-        let as_near_as_may_be = passes == FOLLOWED && !may_halve && within(AT_EDGE, TIRED);
-        now <= fit || near || alternates || as_near_as_may_be
+        let stalls =
+            within(SAME_ROWS, SAME_ROWS) && (now > 0.25 * before.largest() || linearizations == LINEARIZATIONS);
+        let alternates = linearizations > LONG
+            && within(ALTERNATING_GAPS, ALTERNATING_FORCES)
+            && now >= ALTERNATION * earlier.largest();
+        now <= fit || stalls || alternates
     }
 }
 
@@ -107,13 +78,9 @@ pub(crate) struct CurvedRowsWork<T> {
     /// Gaps evaluated where the balance holds, one per candidate.
     pub(crate) gaps: Vec<T>,
     /// Gaps and slips predicted by the rows of the last solution, one per row.
-    pub(crate) foreseen: Vec<T>,
+    pub(crate) predicted: Vec<T>,
     /// The largest difference after the last linearization.
     pub(crate) worst: Worst,
-    /// Anderson mixing of slowly converging linearizations; present if rows may move within a step.
-    pub(crate) mixing: Option<Box<Mixing<T>>>,
-    /// Whether the step may be halved instead.
-    pub(crate) may_halve: bool,
 }
 
 impl<T: Real> CurvedRowsWork<T> {
@@ -123,17 +90,15 @@ impl<T: Real> CurvedRowsWork<T> {
             version: 0,
             apart: false,
             gaps: Vec::new(),
-            foreseen: Vec::new(),
-            worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: NEAR },
-            mixing: None,
-            may_halve: false,
+            predicted: Vec::new(),
+            worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: SAME_ROWS },
         }
     }
 
     /// Memory for `rows` rows with `entries` weights.
     pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
         self.gaps.resize(rows, T::zero());
-        self.foreseen.resize(rows, T::zero());
+        self.predicted.resize(rows, T::zero());
         if self.rows.rows() == 0 {
             self.rows = ContactJacobian::with_capacity(rows, entries);
         }
@@ -165,25 +130,5 @@ impl<T: Real> CurvedRowsWork<T> {
     /// The version of the rows along which forces act.
     pub(crate) fn version(&self, constraints: &Constraints<'_, T>) -> u64 {
         if self.apart { self.version } else { constraints.version() }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A larger miss of the forces is accepted after many linearizations only.
-    #[test]
-    fn forces_may_miss_more_once_rows_are_tired() {
-        let miss = |force| Miss { gap: 1e-9, force };
-        let settled = |force, passes| miss(force).is_settled::<f64>(passes, [miss(2.0 * force), miss(force)], true);
-        for passes in [1, 2, LONG] {
-            assert!(settled(0.5 * NEAR, passes) && !settled(0.5 * TIRED, passes), "{passes}");
-        }
-        for passes in [SLOW + 1, FOLLOWED] {
-            assert!(settled(0.5 * TIRED, passes) && !settled(2.0 * TIRED, passes), "{passes}");
-        }
-        // Not while each linearization still reduces it to less than a quarter.
-        assert!(!miss(0.5 * TIRED).is_settled::<f64>(SLOW + 1, [miss(0.1), miss(0.2)], true));
     }
 }

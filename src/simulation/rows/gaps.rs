@@ -5,13 +5,13 @@ use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
-use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::rows::part::{Part, gather, of};
+use crate::simulation::rows::constraints::{Constraints, Scratch};
+use crate::simulation::rows::part::{gather, of};
 
 impl<T: Real> Constraints<'_, T> {
     /// Gaps of all rows, refusing NaN and infinity.
     pub(crate) fn finite_gaps(&mut self, t: f64, u: &[T], out: &mut [T]) -> Result<()> {
-        let Self { parts, local, .. } = self;
+        let Self { parts, scratch: Scratch { local, .. }, .. } = self;
         let mut rest = &mut *out;
         for (number, part) in parts.iter_mut().enumerate() {
             let (own, others) = rest.split_at_mut(part.contacts.len());
@@ -21,23 +21,8 @@ impl<T: Real> Constraints<'_, T> {
             }
             rest = others;
         }
-        self.shift(t, 0, out);
+        self.offsets.add_to(t, 0, out);
         self.refuse_infinite(t, "the gap", out)
-    }
-
-    /// Adds the offsets of the run and of the step to gaps, or to their derivatives.
-    fn shift(&self, t: f64, derivative: usize, out: &mut [T]) {
-        if let Some(overclosures) = &self.overclosures {
-            let share = T::of(overclosures.share(t)[derivative]);
-            for (out, &added) in out.iter_mut().zip(&self.added) {
-                *out += share * added;
-            }
-        }
-        if derivative == 0 {
-            for (gap, &kept) in out.iter_mut().zip(&self.kept) {
-                *gap += kept;
-            }
-        }
     }
 
     /// Refuses values of the rows that are NaN or infinite.
@@ -56,13 +41,7 @@ impl<T: Real> Constraints<'_, T> {
             self.rates_of(number, (t, u, v), own)?;
             rest = others;
         }
-        if let Some(overclosures) = self.overclosures.as_ref().filter(|overclosures| overclosures.vary()) {
-            let [_, rate, acceleration] = overclosures.share(t).map(T::of);
-            for (rates, &added) in out.iter_mut().zip(&self.added) {
-                rates.rate += rate * added;
-                rates.acceleration += acceleration * added;
-            }
-        }
+        self.offsets.add_to_rates(t, out);
         if self.parts.iter().all(|part| part.rates == Some(Rates::Zero)) {
             return Ok(());
         }
@@ -82,30 +61,28 @@ impl<T: Real> Constraints<'_, T> {
         if out.is_empty() {
             return Ok(());
         }
-        let Self { parts, local, differences, ahead, .. } = self;
-        let Part { constraint, dofs, contacts, variation, place, rates: said, .. } = &mut parts[number];
-        if *said == Some(Rates::Zero) {
+        let Self { parts, scratch: Scratch { local, differences, .. }, ahead, .. } = self;
+        let part = &mut parts[number];
+        if part.rates == Some(Rates::Zero) {
             out.fill(GapRates::default());
             return Ok(());
         }
-        let (u, v) = (gather(dofs, u, &mut local.u), gather(dofs, v, &mut local.v));
-        let answer = constraint.rates(t, u, v, out).map_err(|error| of(number, error))?;
-        *said = Some(answer);
+        let (u, v) = (gather(&part.dofs, u, &mut local.u), gather(&part.dofs, v, &mut local.v));
+        let answer = part.constraint.rates(t, u, v, out).map_err(|error| of(number, error))?;
+        part.rates = Some(answer);
         match answer {
-            Rates::Given => {}
-            Rates::Zero => out.fill(GapRates::default()),
-            Rates::Differences => {
-                let home = (*variation == Variation::Follows).then_some((place.0, &place.1[..]));
-                let found = differences.find(&mut **constraint, contacts, home, (t, u, v), *ahead, out);
-                found.map_err(|error| of(number, error))?;
+            Rates::Given => Ok(()),
+            Rates::Zero => {
+                out.fill(GapRates::default());
+                Ok(())
             }
+            Rates::Differences => differences.find(part, (t, u, v), *ahead, out).map_err(|error| of(number, error)),
         }
-        Ok(())
     }
 
     /// The parts of the slip rates that do not come from v and a, one entry per tangential row.
     pub(crate) fn finite_slip_rates(&mut self, t: f64, u: &[T], v: &[T], out: &mut [GapRates<T>]) -> Result<()> {
-        let Self { parts, ids, tangents, slip_rates, local, .. } = self;
+        let Self { parts, ids, tangents, scratch: Scratch { slip_rates, local, .. }, .. } = self;
         let (mut contact, mut filled) = (0, 0);
         for (number, part) in parts.iter_mut().enumerate() {
             let first = contact;
@@ -196,21 +173,21 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
                     return Ok(());
                 }
                 if field == 0 {
-                    let Self { parts, local, .. } = self;
+                    let Self { parts, scratch: Scratch { local, .. }, .. } = self;
                     let part = &mut parts[number];
                     let u = gather(&part.dofs, u, &mut local.u);
                     return part.constraint.gaps(t, u, out).map_err(|error| of(number, error));
                 }
-                let mut rates = std::mem::take(&mut self.rates);
+                let mut rates = std::mem::take(&mut self.scratch.rates);
                 rates.resize(count.max(rates.len()), GapRates::default());
                 let found = self.rates_of(number, (t, u, v), &mut rates[..count]);
-                let Self { parts, local, scratch, .. } = self;
+                let Self { parts, scratch: Scratch { local, contacts: other, .. }, .. } = self;
                 let part = &mut parts[number];
                 let contacts = match part.variation {
                     Variation::Follows => {
-                        scratch.clear();
-                        part.constraint.contacts(scratch);
-                        scratch
+                        other.clear();
+                        part.constraint.contacts(other);
+                        other
                     }
                     _ => &mut part.contacts,
                 };
@@ -219,17 +196,17 @@ impl<T: Real> Gaps<T> for Constraints<'_, T> {
                     let own = if field == 1 { own.rate } else { own.acceleration };
                     *out = contacts.rows().product(row, x) + own;
                 }
-                self.rates = rates;
+                self.scratch.rates = rates;
                 found
             });
             // Linearizes the same rows again, after an error too: G need not be read again.
             let back = self.follow_part(number, here.0, here.1);
             self.parts[number].stale |= back.is_err();
-            self.stale |= back.is_err();
+            self.reading.stale |= back.is_err();
             found.and(back)?;
             first += self.parts[number].contacts.len();
         }
-        self.shift(t, field.min(2), out);
+        self.offsets.add_to(t, field.min(2), out);
         self.refuse_infinite(t, ["the gap", "the gap rate", "the gap acceleration"][field.min(2)], out)
     }
 }

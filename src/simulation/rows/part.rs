@@ -29,12 +29,12 @@ impl<T: Real> Part<'_, T> {
         if self.variation != Variation::Follows {
             return Ok(Candidates::Unchanged);
         }
-        self.settle(t, u);
+        self.store_place(t, u);
         self.constraint.follow(t, u)
     }
 
     /// Stores where the rows are linearized.
-    pub(crate) fn settle(&mut self, t: f64, u: &[T]) {
+    pub(crate) fn store_place(&mut self, t: f64, u: &[T]) {
         if self.variation == Variation::Follows {
             self.place.0 = t;
             self.place.1.clear();

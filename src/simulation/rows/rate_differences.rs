@@ -1,8 +1,10 @@
 //! Gap rates of constraints that do not give them, from differences of their gaps in time.
 
-use crate::contact::{ContactConstraint, Contacts, GapRates};
+use crate::contact::{GapRates, Variation};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
+use crate::simulation::rows::part::Part;
 use crate::state::resolution;
 
 /// Memory for differences of gaps.
@@ -33,31 +35,29 @@ fn shares<T: Real>() -> [f64; 2] {
 
 impl<T: Real> RateDifferences<T> {
     /// Central differences of the gaps at t ± δ: with u held for the rate ∂g/∂t, along u ± δ v for the acceleration
-    /// Ġ v + ∂ġ/∂t. Differences within rounding are zero. `home` is where the rows are linearized before and after,
-    /// if they follow u.
+    /// Ġ v + ∂ġ/∂t. Differences within rounding are zero. Rows that follow u are linearized where they were before.
     pub(crate) fn find(
         &mut self,
-        constraint: &mut dyn ContactConstraint<T>,
-        contacts: &Contacts<T>,
-        home: Option<(f64, &[T])>,
+        part: &mut Part<'_, T>,
         (t, u, v): (f64, &[T], &[T]),
         ahead: f64,
         out: &mut [GapRates<T>],
     ) -> Result<()> {
-        let found = self.difference(constraint, contacts, home.is_some(), (t, u, v), ahead, out);
-        let back = home.map_or(Ok(()), |(t, u)| constraint.follow(t, u).map(drop));
-        found.and(back)
+        let found = self.difference(part, (t, u, v), ahead, out);
+        match part.variation {
+            Variation::Follows => found.and(part.constraint.follow(part.place.0, &part.place.1).map(drop)),
+            _ => found,
+        }
     }
 
     fn difference(
         &mut self,
-        constraint: &mut dyn ContactConstraint<T>,
-        contacts: &Contacts<T>,
-        follows: bool,
+        part: &mut Part<'_, T>,
         (t, u, v): (f64, &[T], &[T]),
         ahead: f64,
         out: &mut [GapRates<T>],
     ) -> Result<()> {
+        let Part { constraint, contacts, variation, .. } = part;
         let Self { before, now, after, moved } = self;
         for gaps in [&mut *before, &mut *now, &mut *after] {
             gaps.clear();
@@ -66,7 +66,7 @@ impl<T: Real> RateDifferences<T> {
         let mut gaps = |s: f64, speed: T, gaps: &mut [T]| {
             moved.clear();
             moved.extend(u.iter().zip(v).map(|(&u, &v)| u + speed * v));
-            if follows {
+            if *variation == Variation::Follows {
                 constraint.follow(t + s, moved)?;
             }
             constraint.gaps(t + s, moved, gaps)
@@ -77,11 +77,11 @@ impl<T: Real> RateDifferences<T> {
         gaps(single, T::zero(), after)?;
         let size = |row: usize| -> T {
             let sum: T = contacts.row(row).map(|(place, weight)| (weight * u[place]).abs()).sum();
-            T::of(16.0) * T::epsilon() * (sum + contacts.magnitude(row))
+            rounding(sum + contacts.magnitude(row))
         };
         let rounded = |row: usize, gaps: [T; 3]| {
             let most = gaps.into_iter().fold(T::zero(), |most, gap| most.max(gap.abs()));
-            size(row) + T::of(16.0) * T::epsilon() * most
+            size(row) + rounding(most)
         };
         for (row, out) in out.iter_mut().enumerate() {
             let change = after[row] - before[row];

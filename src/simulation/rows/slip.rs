@@ -5,15 +5,16 @@
 //! the displacement in the stage instead where velocities do not contain the unknown, dofs have no mass, or
 //! corrections remove contact forces from the accelerations. It is measured along the rows along which friction acts.
 
-use crate::contact::{ContactJacobian, GapRates, Tangents};
+use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::slides;
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::simulation::build::program::{CompiledStage, ContactTarget};
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::rows::contact_rows::{ContactRowsWork, Part};
-use crate::simulation::stage::contact::{ContactStep, ContactWork};
+use crate::simulation::rows::contact_rows::{ContactRowsWork, Slips};
+use crate::simulation::stage::StageSolve;
+use crate::simulation::stage::contact::ContactWork;
 use crate::state::{Clock, Motion};
 
 /// The source of the slip of a stage.
@@ -30,27 +31,13 @@ enum Source<T> {
 }
 
 /// The source of a slip, and the weight of d in it.
-fn source<T: Real>(stage: &CompiledStage<T>, by_way: bool) -> (Source<T>, T) {
+fn source<T: Real>(stage: &CompiledStage<T>, by_displacement: bool) -> (Source<T>, T) {
     let [by_u, by_v, _] = stage.recovery.weights();
     match &stage.contact {
         Some(target) if target.forecast.is_some() => (Source::Target, target.row.weight),
         Some(target) => (Source::WayAhead, target.row.weight - by_u),
-        None if by_v > T::zero() && !by_way => (Source::Velocity(by_u / by_v), by_u),
+        None if by_v > T::zero() && !by_displacement => (Source::Velocity(by_u / by_v), by_u),
         None => (Source::Way, by_u),
-    }
-}
-
-/// Whether the slip of a contact is static: its friction acts on dofs without mass or, where these are solved
-/// together with the others, its gap does.
-fn is_static<T: Real>(
-    part: Part,
-    (tangents, g): (&Tangents, &ContactJacobian<T>),
-    massless: &[usize],
-    row: usize,
-) -> bool {
-    match part {
-        Part::All => tangents.act_on(g, row, massless),
-        Part::Massless | Part::Massive => tangents.rub_on(g, row, massless),
     }
 }
 
@@ -64,59 +51,45 @@ fn time_of_slip<T: Real>(stage: &CompiledStage<T>, clock: Clock, t: f64) -> f64 
     }
 }
 
-impl<T: Real> ContactStep<'_, '_, T> {
+impl<T: Real> StageSolve<'_, '_, T> {
     /// Sets the weights of d in the slips of the contacts in the problem.
-    pub(crate) fn weigh_slips(&self, rows: &mut ContactRowsWork<T>) {
+    pub(crate) fn set_slip_weights(&mut self) {
         let tangents = self.constraints.tangents();
+        let rows = &mut self.contact.rows;
         for row in tangents.contacts() {
-            let is_static = is_static(self.part, (tangents, &*self.g), &rows.massless, row);
-            let (_, weight) = source(self.stage, rows.slides_by_way || is_static);
+            let is_static = rows.massless.has_static_slip(tangents, self.g, row);
+            let (_, weight) = source(self.stage, rows.slips.by_displacement || is_static);
             // Explicit schemes know the force of a spring, but its friction is unknown.
-            let knows = self.constraints.laws()[row].is_compliant() && self.part.takes(&rows.on_massless, row);
-            let rubs = match self.rubs_later(rows, row) {
-                true => self.part == Part::Massive,
-                false => rows.weight[row] > T::zero() || knows,
-            };
-            rows.weight[tangents.of(row)].fill(if rubs { weight } else { T::zero() });
+            let is_known = self.constraints.laws()[row].is_compliant() && rows.massless.contains(row);
+            let has_normal_force = rows.weight[row] > T::zero() || is_known;
+            let solved = rows.massless.solves_friction(tangents, self.g, row, has_normal_force);
+            rows.weight[tangents.of(row)].fill(if solved { weight } else { T::zero() });
             // After a change of candidates these indices belong to other rows.
-            rows.compliance[tangents.of(row)].fill(T::zero());
-            rows.shift[tangents.of(row)].fill(T::zero());
+            rows.laws.compliance[tangents.of(row)].fill(T::zero());
+            rows.laws.shift[tangents.of(row)].fill(T::zero());
         }
     }
 
-    /// Whether the friction of a contact on dofs without mass acts on dofs with mass only. In an explicit stage it is
-    /// not part of the static balance, where nothing would respond to it. It is found afterwards, when its normal
-    /// force is known.
-    fn rubs_later(&self, rows: &ContactRowsWork<T>, row: usize) -> bool {
-        let tangents = (self.constraints.tangents(), &*self.g);
-        self.part != Part::All && rows.on_massless[row] && !is_static(self.part, tangents, &rows.massless, row)
-    }
-
-    /// Evaluates y of the tangential rows at the d that was [placed](Self::place).
-    pub(crate) fn evaluate_slips(
-        &mut self,
-        new: &Motion<T>,
-        past: &[Motion<T>],
-        contact: &mut ContactWork<T>,
-    ) -> Result<()> {
-        let Self { stage, clock, constraints, g, iterate, part, .. } = self;
+    /// Evaluates y of the tangential rows at the d that was [added](Self::add_increment).
+    pub(crate) fn evaluate_slips(&mut self) -> Result<()> {
+        let Self { stage, clock, constraints, g, new, past, vectors, contact, .. } = self;
         if constraints.tangents().is_empty() {
             return Ok(());
         }
-        let ContactWork { rows, interface, .. } = contact;
-        let ContactRowsWork { y, tolerance, target, slips, curved, massless, slides_by_way, .. } = rows;
-        let forces = curved.forces(g);
-        if slips.len() < constraints.tangents().len() {
-            slips.resize(constraints.tangents().len(), GapRates::default());
+        let (ContactWork { rows, interface, .. }, iterate) = (&mut **contact, vectors.iterate());
+        let ContactRowsWork { y, tolerance, target, slips, curved, massless, .. } = rows;
+        let (forces, target) = (curved.forces(g), &target.values);
+        if slips.rates.len() < constraints.tangents().len() {
+            slips.rates.resize(constraints.tangents().len(), GapRates::default());
         }
         let h = T::of(clock.h);
-        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, slips)?;
+        constraints.finite_slip_rates(time_of_slip(stage, *clock, new.t), &new.u, &new.v, &mut slips.rates)?;
         let tangents = constraints.tangents();
         for row in tangents.contacts() {
-            let (source, weight) = source(stage, *slides_by_way || is_static(*part, (tangents, g), massless, row));
+            let (source, weight) = source(stage, slips.by_displacement || massless.has_static_slip(tangents, g, row));
             // Directions are rounded: a motion along the normal contributes rounding to the slip.
             for k in tangents.of(row) {
-                let own = slips[k - tangents.all().start].rate;
+                let own = slips.rates[k - tangents.all().start].rate;
                 (y[k], tolerance[k]) = match source {
                     Source::Velocity(scale) => {
                         let slip = forces.product(k, &new.v) + own;
@@ -135,7 +108,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
                         let ahead = stage.contact.as_ref();
                         let time = T::of(ahead.map_or(stage.end - stage.start, |target| target.at - stage.end)) * h;
                         let ends = match ahead {
-                            Some(_) => [&new.u, &*target],
+                            Some(_) => [&new.u, target],
                             None => [past.first().map_or(&new.u, |start| &start.u), &new.u],
                         };
                         // The terms of the scheme do not have the rounding of displacements, which would make
@@ -167,15 +140,10 @@ impl<T: Real> ContactStep<'_, '_, T> {
 
     /// Stores which contacts slide in a finished stage, and the slips (length/time) that decide it. These are mean
     /// slips where contact is imposed ahead of the state, and for dofs without mass.
-    pub(crate) fn note_slips(
-        &mut self,
-        new: &Motion<T>,
-        past: &[Motion<T>],
-        contact: &mut ContactWork<T>,
-    ) -> Result<()> {
-        let Self { stage, clock, constraints, g, part, .. } = self;
-        let ContactWork { trial, rows, .. } = contact;
-        let ContactRowsWork { slips, curved, target, massless, .. } = rows;
+    pub(crate) fn store_slips(&mut self) -> Result<()> {
+        let Self { stage, clock, constraints, g, new, past, contact, .. } = self;
+        let ContactWork { trial, rows, .. } = &mut **contact;
+        let ContactRowsWork { slips: Slips { rates: slips, .. }, curved, target, massless, .. } = rows;
         if constraints.tangents().is_empty() {
             return Ok(());
         }
@@ -185,12 +153,12 @@ impl<T: Real> ContactStep<'_, '_, T> {
         let (h, first) = (T::of(clock.h), tangents.all().start);
         for row in tangents.contacts() {
             // Ends of the displacement, and its time; a target at velocity level is h times a velocity.
-            let start = past.first().filter(|_| is_static(*part, (tangents, g), massless, row));
+            let start = past.first().filter(|_| massless.has_static_slip(tangents, g, row));
             let (ends, time) = match (start, &stage.contact) {
                 (Some(start), _) => ([Some(&start.u), Some(&new.u)], T::of(stage.end - stage.start) * h),
                 (None, None) => ([None, None], T::one()),
-                (None, Some(ahead)) if ahead.forecast.is_some() => ([None, Some(&*target)], h),
-                (None, Some(ahead)) => ([Some(&new.u), Some(&*target)], T::of(ahead.at - stage.end) * h),
+                (None, Some(ahead)) if ahead.forecast.is_some() => ([None, Some(&target.values)], h),
+                (None, Some(ahead)) => ([Some(&new.u), Some(&target.values)], T::of(ahead.at - stage.end) * h),
             };
             let (mut length, mut noise) = (T::zero(), T::zero());
             for k in tangents.of(row) {
@@ -218,7 +186,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
 /// Stores the slips of the velocities of a state after corrections. In a stage that imposes contact `ahead` of its
 /// state, and for dofs without mass, slips are means over a displacement. These means stay where a contact stops
 /// sliding or reverses, as its friction belongs to them.
-pub(crate) fn note_slips_of_state<T: Real>(
+pub(crate) fn store_slips_of_state<T: Real>(
     (constraints, g): (&mut Constraints<'_, T>, &ContactJacobian<T>),
     new: &Motion<T>,
     ahead: Option<&ContactTarget<T>>,
@@ -228,14 +196,14 @@ pub(crate) fn note_slips_of_state<T: Real>(
         return Ok(());
     }
     let ContactWork { trial, rows, .. } = contact;
-    let ContactRowsWork { slips, massless, .. } = rows;
+    let ContactRowsWork { slips: Slips { rates: slips, .. }, massless, .. } = rows;
     constraints.finite_slip_rates(new.t, &new.u, &new.v, slips)?;
     let tangents = constraints.tangents();
     let first = tangents.all().start;
     for row in tangents.contacts() {
         let slip = |k: usize| g.product(k, &new.v) + slips[k - first].rate;
         let along = tangents.of(row).map(|k| trial.lambda[k] * slip(k)).sum::<T>();
-        let is_mean = ahead.is_some() || tangents.act_on(g, row, massless);
+        let is_mean = ahead.is_some() || tangents.act_on(g, row, &massless.dofs);
         if !is_mean || trial.sliding[row] && along <= T::zero() {
             tangents.of(row).for_each(|k| trial.slip[k - first] = slip(k));
         }

@@ -8,9 +8,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::build::program::{CompiledStage, Program};
 use crate::simulation::stage::StageSolve;
-use crate::simulation::stage::contact::ContactWork;
 use crate::simulation::stage::massless::MasslessBlock;
-use crate::simulation::stage::vectors::{StageVectors, predict};
 use crate::state::{ContactState, Motion};
 use crate::system::{Linearity, System};
 
@@ -138,14 +136,12 @@ impl<T: Real> ExcessForces<T> {
     pub(crate) fn solve_again(
         &mut self,
         solve: &mut StageSolve<'_, '_, T>,
-        (new, past): (&mut Motion<T>, &[Motion<T>]),
-        (vectors, contact): (&mut StageVectors<T>, &mut ContactWork<T>),
-        (switching, projection): (&mut Switching<T>, &mut JumpProjection<T>),
+        switching: &mut Switching<T>,
+        projection: &mut JumpProjection<T>,
     ) -> Result<T> {
-        let Some(start) = past.first() else { return Ok(T::zero()) };
         let mut part = None;
         for pass in 0.. {
-            let left = self.measure(solve, [start, new], &contact.trial, switching)?;
+            let left = self.measure(solve, switching)?;
             // If the iteration does not improve, the last solution is the stage without any excess.
             if left <= T::of(LEFT) || pass > PASSES || pass == PASSES && left < T::one() {
                 break;
@@ -155,10 +151,10 @@ impl<T: Real> ExcessForces<T> {
             } else {
                 switching.forget_excess();
             }
-            self.press_less(solve.g, projection, &vectors.supports.dofs, &contact.trial, switching)?;
-            predict(solve.stage, solve.clock, &mut *solve.system, new, past, vectors)?;
-            self.shift(solve.stage, solve.clock.h, new);
-            solve.directly(None, new, past, vectors, contact)?;
+            self.press_less(solve.g, projection, &solve.vectors.supports.dofs, &solve.contact.trial, switching)?;
+            solve.predict()?;
+            self.shift(solve.stage, solve.clock.h, solve.new);
+            solve.solve(None, None)?;
         }
         Ok(if self.is_shifted { dot(&self.forces, &self.followed) } else { T::zero() })
     }
@@ -178,14 +174,10 @@ impl<T: Real> ExcessForces<T> {
 
     /// Finds the required change of δ, and the work that δ does not do. Returns the work of the required changes as a
     /// share of the work of all contacts that close or open.
-    fn measure(
-        &mut self,
-        solve: &mut StageSolve<'_, '_, T>,
-        [start, new]: [&Motion<T>; 2],
-        contacts: &ContactState<T>,
-        switching: &mut Switching<T>,
-    ) -> Result<T> {
-        let StageSolve { constraints, g, clock, stage, .. } = solve;
+    fn measure(&mut self, solve: &mut StageSolve<'_, '_, T>, switching: &mut Switching<T>) -> Result<T> {
+        let StageSolve { constraints, g, clock, stage, new, past, contact, .. } = solve;
+        let Some(start) = past.first() else { return Ok(T::zero()) };
+        let contacts = &contact.trial;
         let Self { statics, gaps, misses, way, followed, .. } = self;
         let (mut missed, mut all) = (T::zero(), T::zero());
         if !switching.switches(contacts) {

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::simulation::stage::path::PathWork;
 
 /// When the effective matrix is formed and factorized again.
@@ -116,7 +117,7 @@ impl Newton {
 
     /// Tolerances in force and displacement, raised to the resolution of the scalar.
     pub(crate) fn bounds<T: Real>(&self) -> [f64; 2] {
-        [self.force, self.displacement].map(|tolerance| tolerance.max(64.0 * T::epsilon().value()))
+        [self.force, self.displacement].map(|tolerance| tolerance.max(rounding(T::one()).value()))
     }
 }
 

@@ -1,8 +1,9 @@
 //! The force along a path: its internal work over a step is the change of the potential.
 
 use crate::error::Result;
-use crate::ranks::Together;
 use crate::real::Real;
+use crate::rounding::rounding;
+use crate::simulation::stage::Host;
 use crate::system::{Path, System};
 
 /// How the force along a path was computed.
@@ -41,15 +42,17 @@ impl<T: Real> PathWork<T> {
     /// Simpson's rule. Each of the three internal forces has no resultant, hence neither has the mean.
     pub(crate) fn force(
         &mut self,
-        (system, together): (&mut dyn System<T>, &Together<T>),
+        host: &mut Host<'_, T>,
         t: f64,
-        [from, to, mean]: [&[T]; 3],
+        path: Path<'_, T>,
         v: &[T],
         out: &mut [T],
     ) -> Result<()> {
+        let Host { system, together } = host;
+        let Path { from, to, mean } = path;
         if let Some(own) = system.path_force() {
             self.form = PathForm::Own;
-            return own.force_along(t, Path { from, to, mean }, v, out);
+            return own.force_along(t, path, v, out);
         }
         let Self { start, form, load, scratch } = self;
         system.force(t, mean, v, out)?;
@@ -75,8 +78,8 @@ impl<T: Real> PathWork<T> {
         let center = works.iter().copied().sum::<T>() / T::of(3.0);
         let apart = works.map(|work| work - center);
         let square = apart.iter().map(|&x| x * x).sum::<T>();
-        let rounding = T::of(64.0) * T::epsilon() * (before.abs() + after.abs() + other.abs());
-        let share = if miss.abs() > rounding && miss * miss <= square { miss / square } else { T::zero() };
+        let rounded = rounding(before.abs() + after.abs() + other.abs());
+        let share = if miss.abs() > rounded && miss * miss <= square { miss / square } else { T::zero() };
         let [a, b, c]: [T; 3] = std::array::from_fn(|k| simpson[k] + share * apart[k]);
         for ((out, &start), &end) in out.iter_mut().zip(scratch.iter()).zip(load.iter()) {
             *out = a * start + b * *out + c * end;

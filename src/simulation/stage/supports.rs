@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::mass::Mass;
 use crate::real::Real;
+use crate::rounding::rounding;
 use crate::state::Motion;
 use crate::system::System;
 
@@ -81,7 +82,7 @@ pub(crate) fn put_initial_supports<T: Real>(
 /// Sets an initial value to the value of its support. Refuses a different value given by the host, unless it is zero.
 fn put<T: Real>(place: &mut T, prescribed: T, what: &'static str, dof: usize) -> Result<()> {
     let given = *place;
-    let same = (given - prescribed).abs() <= T::of(1e3) * T::epsilon() * prescribed.abs();
+    let same = (given - prescribed).abs() <= rounding(prescribed.abs());
     if given != T::zero() && !same {
         let (given, prescribed) = (given.value(), prescribed.value());
         return Err(Error::PrescribedStart { what, dof, given, prescribed });

@@ -3,8 +3,9 @@
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::build::program::CompiledStage;
+use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::supports::{Supports, put_supports};
-use crate::state::{Clock, Motion};
+use crate::state::Motion;
 use crate::system::System;
 
 /// Vectors of a stage, one entry a dof.
@@ -14,36 +15,59 @@ pub(crate) struct StageVectors<T> {
     /// ū, v̄, ā if the balance does not hold at the recovered state.
     pub(crate) balance: Option<Motion<T>>,
     pub(crate) supports: Supports<T>,
+    /// In an iteration of Newton's method, the part of d that motions contain already; empty otherwise.
+    pub(crate) iterate: Vec<T>,
 }
 
-/// Predicts the new motion at d = 0, and the motion of the balance if it differs: displacements and velocities with
-/// the supports in place, and the part of the accelerations that comes from the past.
-pub(crate) fn predict<T: Real>(
-    stage: &CompiledStage<T>,
-    clock: Clock,
-    system: &mut dyn System<T>,
-    new: &mut Motion<T>,
-    past: &[Motion<T>],
-    vectors: &mut StageVectors<T>,
-) -> Result<()> {
-    let StageVectors { balance, supports, .. } = vectors;
-    let Supports { dofs: prescribed, state: supports, balance: balance_supports, .. } = supports;
-    stage.recovery.predict(past, &mut [&mut new.u, &mut new.v, &mut new.a]);
-    put_supports(system, new.t, prescribed, supports, new)?;
-    if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
-        rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
-        put_supports(system, clock.at(stage.load), prescribed, balance_supports, balance)?;
-        if let (true, Some(start)) = (stage.along_path, past.first()) {
-            // Supports too are at the mean of both ends, and their velocity is the difference of the ends over the
-            // time: the work of a step is force times this difference.
-            let per_step = T::of((clock.h * (stage.end - stage.start)).recip());
-            for &dof in prescribed.iter() {
-                let (from, to) = (start.u[dof], new.u[dof]);
-                (balance.u[dof], balance.v[dof]) = (T::of(0.5) * (from + to), per_step * (to - from));
-            }
+impl<T: Real> StageVectors<T> {
+    /// The motion at which the balance holds.
+    pub(crate) fn balanced<'m>(&'m self, stage: &CompiledStage<T>, new: &'m Motion<T>) -> &'m Motion<T> {
+        match (&stage.balance, &self.balance) {
+            (Some(_), Some(balance)) => balance,
+            _ => new,
         }
     }
-    Ok(())
+
+    /// In an iteration of Newton's method, the part of the unknown that motions contain already: d is then measured
+    /// from there, and the accelerations contain all of it.
+    pub(crate) fn iterate(&self) -> Option<&[T]> {
+        (!self.iterate.is_empty()).then_some(&self.iterate)
+    }
+}
+
+impl<T: Real> StageSolve<'_, '_, T> {
+    /// Predicts the new motion at d = 0, and the motion of the balance if it differs: displacements and velocities with
+    /// the supports in place, and the part of the accelerations that comes from the past.
+    pub(crate) fn predict(&mut self) -> Result<()> {
+        let Self { stage, clock, host, new, past, .. } = self;
+        let StageVectors { balance, supports, .. } = &mut *self.vectors;
+        let Supports { dofs: prescribed, state: supports, balance: balance_supports, .. } = supports;
+        new.t = clock.at(stage.end);
+        stage.recovery.predict(past, &mut [&mut new.u, &mut new.v, &mut new.a]);
+        put_supports(host.system, new.t, prescribed, supports, new)?;
+        if let (Some(rows), Some(balance)) = (&stage.balance, balance.as_mut()) {
+            rows.predict(past, &mut [&mut balance.u, &mut balance.v, &mut balance.a]);
+            put_supports(host.system, clock.at(stage.load), prescribed, balance_supports, balance)?;
+            if let (true, Some(start)) = (stage.along_path, past.first()) {
+                // Supports too are at the mean of both ends, and their velocity is the difference of the ends over the
+                // time: the work of a step is force times this difference.
+                let per_step = T::of((clock.h * (stage.end - stage.start)).recip());
+                for &dof in prescribed.iter() {
+                    let (from, to) = (start.u[dof], new.u[dof]);
+                    (balance.u[dof], balance.v[dof]) = (T::of(0.5) * (from + to), per_step * (to - from));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the accelerations of the supports in a solved stage.
+    pub(crate) fn set_support_accelerations(&mut self) {
+        let Supports { dofs, state, .. } = &self.vectors.supports;
+        for (&dof, support) in dofs.iter().zip(state) {
+            self.new.a[dof] = support[2];
+        }
+    }
 }
 
 /// Writes f(t̄, ū, v̄) − M ā of a predicted motion to `vectors.increment`.
@@ -54,7 +78,7 @@ pub(crate) fn residual<T: Real>(
     new: &mut Motion<T>,
     vectors: &mut StageVectors<T>,
 ) -> Result<()> {
-    let StageVectors { increment, balance, supports } = vectors;
+    let StageVectors { increment, balance, supports, .. } = vectors;
     let Supports { dofs: prescribed, state: supports, balance: balance_supports, coupled_mass } = supports;
     let (rows, supports, motion) = match (&stage.balance, balance.as_mut()) {
         (Some(rows), Some(balance)) => (rows, balance_supports, balance),

@@ -20,7 +20,6 @@ impl<T: Real> Simulation<'_, T> {
             let last = smaller < judge.control.smallest * (1.0 - 1e-9);
             judge.suspended = last;
             judge.begin(&self.state, self.history.pace.lasting);
-            self.work.contact.rows.curved.may_halve = !last;
             match self.attempt() {
                 Ok(Verdict::Accepted) => break Ok(()),
                 Err(error) if !error.is_recoverable() => break Err(error),

@@ -276,8 +276,8 @@ impl<T: Real> Simulation<'_, T> {
         };
         let Begun { state: mut begun, history: past, .. } =
             start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
-        work.contact.rows.reserved = constraints.room().min(FORESEEN);
-        contact_solver.reserve(work.contact.rows.reserved);
+        work.contact.rows.problem.reserved = constraints.room().min(FORESEEN);
+        contact_solver.reserve(work.contact.rows.problem.reserved);
         let depth = scheme.depth;
         if past.known < depth && startup.is_none() {
             let (interface, unit) = (constraints.interface(), Unit::of(constraints));

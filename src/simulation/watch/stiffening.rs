@@ -241,9 +241,9 @@ impl<T: Real> Stiffening<T> {
             let force = trial.lambda_raw[row].max(trial.impulse[row] / T::of(step.clock.h));
             // The unknown may contain the force of the dashpot only.
             let holds = rows.weight[row] != T::zero();
-            let coupled = holds && !law.is_damped() || rows.on_massless.get(row).is_some_and(|on| *on);
+            let coupled = holds && !law.is_damped() || rows.massless.acts.get(row).is_some_and(|on| *on);
             if law.is_spring() && !coupled && force > T::zero() {
-                let [stiffness, damping] = law.slopes(force.value(), (-rows.balance_gap[row]).value());
+                let [stiffness, damping] = law.slopes(force.value(), (-rows.laws.balance_gap[row]).value());
                 // Both limits together: (Ω/Ω_c)² + (c h/m)/x_c < 1.
                 let lagged = damping > 0.0 && !holds;
                 let lag = lagged.then(|| *self.lag.get_or_insert_with(|| lag(step.scheme, self.critical)));

@@ -4,9 +4,11 @@ use crate::contact::ContactLaw;
 use crate::corrector::{Buffers, Gaps};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::rows::contact_rows::{Level, Part};
-use crate::simulation::stage::contact::{ContactStep, ContactWork};
-use crate::state::Motion;
+use crate::rounding::touching;
+use crate::simulation::rows::contact_rows::Level;
+use crate::simulation::rows::row_state::RowState;
+use crate::simulation::stage::StageSolve;
+use crate::simulation::stage::contact::ContactWork;
 
 /// The position of a stage in its step, for the impulses of its contacts.
 pub(crate) struct Booking {
@@ -17,46 +19,14 @@ pub(crate) struct Booking {
     pub(crate) is_last: bool,
 }
 
-impl<T: Real> ContactStep<'_, '_, T> {
+impl<T: Real> StageSolve<'_, '_, T> {
     /// Decides which contacts are closed, and sets the reported force and impulse of each before corrections.
-    pub(crate) fn close(
-        &mut self,
-        (new, past): (&Motion<T>, &[Motion<T>]),
-        booking: &Booking,
-        massless: &[usize],
-        buffers: &mut Buffers<T>,
-        contact: &mut ContactWork<T>,
-    ) -> Result<()> {
-        let Self { stage, clock, constraints, g, .. } = self;
-        let ContactWork { trial, impulses, rows, was_closed, was_sticking, closed_at_start, .. } = contact;
-        let level = Level { target: stage.contact.as_ref(), clock: *clock };
-        rows.evaluate(&level, constraints, g, new, 1e-10)?;
-        if level.target.is_none() {
-            trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
-        } else {
-            // The reported gaps are evaluated at the displacements of the state.
-            rows.curved.hold(g, constraints);
-            constraints.follow(new.t, &new.u, g)?;
-            rows.curved.release(constraints);
-            constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
-        }
+    pub(crate) fn close(&mut self, booking: &Booking, buffers: &mut Buffers<T>) -> Result<()> {
+        self.evaluate_end(booking)?;
+        let Self { clock, constraints, g, contact, .. } = self;
+        let ContactWork { trial, impulses, rows, was_closed, was_sticking, closed_at_start, .. } = &mut **contact;
+        let massless = &rows.massless.dofs;
         let impulse_weight = T::of(clock.h * booking.impulse_weight);
-        impulses.push(rows.curved.forces(g), &trial.lambda_raw, impulse_weight);
-        if rows.curved.apart {
-            // Turns multipliers from the rows of the balance to the rows of the state, which are used from here on.
-            let tangents = constraints.tangents();
-            tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
-        }
-        rows.measure(stage, clock.h, constraints, g, new, None)?;
-        if self.part != Part::All && level.target.is_some() {
-            // Rows on dofs without mass constrain the gaps of the state.
-            for row in (0..constraints.len()).filter(|&row| rows.on_massless[row]) {
-                let rate = g.product(row, &new.v) + rows.rates[row].rate;
-                let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
-                (rows.y[row], rows.enabled[row]) = (trial.gap[row], true);
-                rows.tolerance[row] = rounded + T::of(1e-10 * clock.h) * rate.abs();
-            }
-        }
         was_closed.clear();
         was_closed.extend_from_slice(&trial.closed);
         was_sticking.clear();
@@ -73,8 +43,7 @@ impl<T: Real> ContactStep<'_, '_, T> {
         for (row, &was_closed) in was_closed.iter().enumerate() {
             let raw = trial.lambda_raw[row];
             let law = constraints.law(row);
-            let touching = rows.enabled[row] && rows.y[row] <= rows.tolerance[row] && !law.is_compliant();
-            let closed = raw > T::zero() || touching || law.is_equality();
+            let closed = rows.is_closed(row, &law, raw);
             trial.closed[row] = closed;
             // Compliant contacts, and contacts on dofs without mass, leave no jump to correct. Impulses do not reach
             // such dofs: friction there would be taken from one side only.
@@ -112,6 +81,40 @@ impl<T: Real> ContactStep<'_, '_, T> {
             trial.impulse[row] += impulse_weight * trial.lambda_raw[row];
         }
         impulses.note(trial);
-        self.note_slips(new, past, contact)
+        self.store_slips()
+    }
+
+    /// Evaluates gaps and slips at the end of the stage, with the rows linearized there, and books the impulses.
+    fn evaluate_end(&mut self, booking: &Booking) -> Result<()> {
+        let Self { stage, clock, constraints, g, new, contact, .. } = self;
+        let ContactWork { trial, impulses, rows, .. } = &mut **contact;
+        let level = Level { target: stage.contact.as_ref(), clock: *clock };
+        rows.evaluate(&level, constraints, g, new, true)?;
+        if level.target.is_none() {
+            trial.gap.copy_from_slice(&rows.y[..constraints.len()]);
+        } else {
+            // The reported gaps are evaluated at the displacements of the state.
+            rows.curved.hold(g, constraints);
+            constraints.follow(new.t, &new.u, g)?;
+            rows.curved.release(constraints);
+            constraints.finite_gaps(new.t, &new.u, &mut trial.gap)?;
+        }
+        impulses.push(rows.curved.forces(g), &trial.lambda_raw, T::of(clock.h * booking.impulse_weight));
+        if rows.curved.apart {
+            // Turns multipliers from the rows of the balance to the rows of the state, which are used from here on.
+            let tangents = constraints.tangents();
+            tangents.turn([&rows.curved.rows, g], &mut trial.lambda_raw[tangents.all()]);
+        }
+        rows.measure(stage, clock.h, constraints, g, new, None)?;
+        if !rows.massless.is_whole() && level.target.is_some() {
+            // Rows on dofs without mass constrain the gaps of the state.
+            for row in (0..constraints.len()).filter(|&row| rows.massless.acts[row]) {
+                let rate = g.product(row, &new.v) + rows.rates[row].rate;
+                let rounded = constraints.gap_rounding(row, g.magnitude(row, &new.u), trial.gap[row]);
+                (rows.y[row], rows.state[row]) = (trial.gap[row], RowState::Open);
+                rows.tolerance[row] = rounded + touching(T::of(clock.h) * rate.abs());
+            }
+        }
+        Ok(())
     }
 }

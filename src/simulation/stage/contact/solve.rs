@@ -2,168 +2,89 @@
 //! result agree.
 
 use crate::contact::Candidates;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::real::Real;
-use crate::simulation::operator::Operator;
 use crate::simulation::operator::interface::{advance, keep, restore};
-use crate::simulation::rows::curved_rows::{FOLLOWED, Miss, SLOW};
-use crate::simulation::stage::contact::mixing::ELSEWHERE;
-use crate::simulation::stage::contact::{ContactStep, ContactWork};
-use crate::simulation::stage::vectors::StageVectors;
-use crate::state::Motion;
-use crate::system::System;
+use crate::simulation::rows::curved_rows::{LINEARIZATIONS, Miss};
+use crate::simulation::stage::StageSolve;
 
-impl<T: Real> ContactStep<'_, '_, T> {
+impl<T: Real> StageSolve<'_, '_, T> {
     /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces
     /// in `interface.forces`. Motions are left as predicted. Returns whether curved rows fit the resulting d.
-    pub(crate) fn solve(
-        &mut self,
-        system: &mut dyn System<T>,
-        operator: &mut Operator<T>,
-        new: &mut Motion<T>,
-        past: &[Motion<T>],
-        vectors: &mut StageVectors<T>,
-        contact: &mut ContactWork<T>,
-    ) -> Result<bool> {
-        let dofs = self.constraints.interface();
-        if self.moves_state() {
-            keep(dofs, &new.u, &mut contact.interface.displacement);
-        }
-        if let (Some(_), Some(balance)) = (&self.stage.balance, &vectors.balance) {
-            keep(dofs, &balance.u, &mut contact.interface.balance);
-        }
-        contact.interface.free.copy_from_slice(&contact.interface.increment);
-        self.aim(system, new, past, &vectors.supports.dofs, contact)?;
-        let result = self.settle(operator, new, past, vectors, contact);
-        let (dofs, interface) = (self.constraints.interface(), &contact.interface);
-        if self.moves_state() {
-            restore(dofs, &interface.displacement, &mut new.u);
-        }
-        if let (Some(_), Some(balance)) = (&self.stage.balance, &mut vectors.balance) {
-            restore(dofs, &interface.balance, &mut balance.u);
-        }
-        if let Some(target) = &self.stage.contact {
-            advance(dofs, &interface.target, target.row.weight, &interface.increment, &mut contact.rows.target);
-        }
+    pub(crate) fn solve_contact(&mut self) -> Result<bool> {
+        self.keep_motion();
+        let result = self.predict_target().and_then(|()| self.iterate_contact());
+        self.restore_motion();
         result
     }
 
     /// Solves with the present rows, then with rows linearized at the result, until rows and result agree.
-    pub(crate) fn settle(
-        &mut self,
-        operator: &mut Operator<T>,
-        new: &mut Motion<T>,
-        past: &[Motion<T>],
-        vectors: &mut StageVectors<T>,
-        contact: &mut ContactWork<T>,
-    ) -> Result<bool> {
+    fn iterate_contact(&mut self) -> Result<bool> {
         let mut before = [Miss::ALL; 2];
-        for pass in 0..FOLLOWED {
-            match pass {
-                0 => self.observe(operator, new, past, vectors, contact)?,
-                _ => self.step_back(operator, new, vectors, contact)?,
+        for iteration in 1..=LINEARIZATIONS {
+            match iteration {
+                1 => self.evaluate_without_contact()?,
+                _ => self.extrapolate_without_contact()?,
             }
-            let needed = self.condition(new, contact);
+            let needed = self.decide_problem();
             match needed {
-                true => self.press(operator, new.t, contact)?,
-                false => self.release(contact),
+                true => self.solve_problem()?,
+                false => self.clear_multipliers(),
             }
             if self.constraints.is_affine() {
                 return Ok(true);
             }
-            self.foresee(needed, contact);
-            if self.follow(new, vectors, contact)? == Candidates::Unchanged {
-                return self.refuse_elsewhere(pass, new.t, contact);
+            self.predict_gaps(needed);
+            if self.linearize_rows()? == Candidates::Unchanged {
+                return Ok(true);
             }
-            operator.follow(contact.rows.curved.version(self.constraints));
-            let miss = self.miss(new, past, contact)?;
-            if miss.is_settled::<T>(pass + 1, before, contact.rows.curved.may_halve) {
-                return self.refuse_elsewhere(pass, new.t, contact);
+            self.operator.follow(self.contact.rows.curved.version(self.constraints));
+            let miss = self.measure_miss()?;
+            if miss.has_converged::<T>(iteration, before) {
+                return Ok(true);
             }
             before = [miss, before[0]];
-            if (SLOW..FOLLOWED).contains(&(pass + 1)) {
-                self.mix(pass + 1 > SLOW, operator, new, past, vectors, contact)?;
-            }
         }
         Ok(false)
     }
 
-    /// Rejects the fixed point found by Anderson mixing if it is far from the unmixed iterates and the step can be
-    /// halved.
-    fn refuse_elsewhere(&self, pass: usize, t: f64, contact: &ContactWork<T>) -> Result<bool> {
-        let ContactWork { rows, interface, .. } = contact;
-        let mixed = rows.curved.mixing.as_ref().filter(|_| rows.curved.may_halve && pass >= SLOW);
-        match mixed.and_then(|mixing| mixing.elsewhere(&interface.increment, &interface.free)) {
-            None => Ok(true),
-            Some(change) => {
-                let (iterations, contact) = (pass + 1, self.constraints.ids[rows.curved.worst.row]);
-                let (what, tolerance) = ("the displacement", ELSEWHERE);
-                Err(Error::ContactUnsettled { t, iterations, contact, what, change, tolerance })
-            }
-        }
-    }
-
-    /// Relinearizes the rows at the Anderson-mixed iterate instead of the last result. The first call only stores the
-    /// result.
-    fn mix(
-        &mut self,
-        knows: bool,
-        operator: &mut Operator<T>,
-        new: &mut Motion<T>,
-        past: &[Motion<T>],
-        vectors: &mut StageVectors<T>,
-        contact: &mut ContactWork<T>,
-    ) -> Result<()> {
-        let ContactWork { rows, interface, .. } = contact;
-        let Some(mixing) = &mut rows.curved.mixing else { return Ok(()) };
-        match knows {
-            false => mixing.begin(&interface.increment),
-            true => mixing.learn(&interface.increment),
-        }
-        if mixing.mix(&mut interface.increment) {
-            let mut followed = self.follow(new, vectors, contact);
-            if followed.is_err() {
-                // A contact that is lost there is not lost at the result.
-                let ContactWork { rows, interface, .. } = contact;
-                rows.curved.mixing.iter_mut().for_each(|mixing| mixing.give_up(&mut interface.increment));
-                followed = self.follow(new, vectors, contact);
-            }
-            followed?;
-            operator.follow(contact.rows.curved.version(self.constraints));
-            self.evaluate(new, contact)?;
-            self.evaluate_slips(new, past, contact)?;
-        }
-        let ContactWork { rows, interface, .. } = contact;
-        rows.curved.mixing.iter_mut().for_each(|mixing| mixing.begin_at(&interface.increment));
-        Ok(())
-    }
-
     /// Evaluates y of every row at d without contact, with the present rows, after the forces of compliant laws that
     /// do not depend on d are applied.
-    pub(crate) fn observe(
-        &mut self,
-        operator: &mut Operator<T>,
-        new: &mut Motion<T>,
-        past: &[Motion<T>],
-        vectors: &mut StageVectors<T>,
-        contact: &mut ContactWork<T>,
-    ) -> Result<()> {
-        self.weigh(&mut contact.rows);
-        self.place(new, vectors, contact);
-        if self.constraints.laws().compliant {
-            self.balance_gaps(new, vectors, contact)?;
-            self.add_inertia(new, vectors, contact)?;
-            self.approach(new, vectors, contact)?;
-            if self.press_without_coupling(operator, contact)? {
-                self.place(new, vectors, contact);
-                self.balance_gaps(new, vectors, contact)?;
-                self.add_inertia(new, vectors, contact)?;
-                self.approach(new, vectors, contact)?;
-            }
+    fn evaluate_without_contact(&mut self) -> Result<()> {
+        self.set_weights();
+        self.evaluate_laws(Self::evaluate_balance_gaps)?;
+        self.add_increment();
+        self.evaluate_rows()?;
+        self.extrapolate_along_forces();
+        self.add_restitution()
+    }
+
+    /// Keeps the values of the predicted motions on the interface, and d without contact.
+    fn keep_motion(&mut self) {
+        let (moves_state, dofs) = (self.moves_state(), self.constraints.interface());
+        let interface = &mut self.contact.interface;
+        if moves_state {
+            keep(dofs, &self.new.u, &mut interface.displacement);
         }
-        self.evaluate(new, contact)?;
-        self.evaluate_slips(new, past, contact)?;
-        self.extrapolate(new, contact);
-        self.restitution(past, &mut contact.rows)
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &self.vectors.balance) {
+            keep(dofs, &balance.u, &mut interface.balance);
+        }
+        interface.free.copy_from_slice(&interface.increment);
+    }
+
+    /// Restores the predicted motions, and leaves the target at the resulting d.
+    fn restore_motion(&mut self) {
+        let (moves_state, dofs) = (self.moves_state(), self.constraints.interface());
+        let interface = &self.contact.interface;
+        if moves_state {
+            restore(dofs, &interface.displacement, &mut self.new.u);
+        }
+        if let (Some(_), Some(balance)) = (&self.stage.balance, &mut self.vectors.balance) {
+            restore(dofs, &interface.balance, &mut balance.u);
+        }
+        if let Some(target) = &self.stage.contact {
+            let values = &mut self.contact.rows.target.values;
+            advance(dofs, &interface.target, target.row.weight, &interface.increment, values);
+        }
     }
 }

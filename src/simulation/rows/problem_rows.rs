@@ -1,0 +1,127 @@
+//! The contact problem of a stage: its rows, and its data with one entry per row of it.
+
+use crate::contact::ContactJacobian;
+use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
+use crate::real::Real;
+use crate::simulation::operator::Operator;
+use crate::simulation::rows::constraints::Constraints;
+use crate::simulation::rows::contact_rows::ContactRowsWork;
+
+/// The contact problem of a stage.
+pub(crate) struct ProblemRows<T> {
+    /// Its rows, group by group.
+    pub(crate) rows: Vec<usize>,
+    /// The same rows, ascending.
+    sorted: Vec<usize>,
+    pub(crate) offset: Vec<T>,
+    pub(crate) tolerance: Vec<T>,
+    pub(crate) sets: Vec<AdmissibleSet>,
+    pub(crate) multipliers: Vec<T>,
+    /// Compliances of the rows, and magnitude of the diagonal of W, if W is applied and not formed.
+    pub(crate) own: Vec<T>,
+    pub(crate) scale: Vec<T>,
+    pub(crate) known: KnownForces<T>,
+    /// Number of rows for which the contact solver has reserved memory.
+    pub(crate) reserved: usize,
+    /// Number of rows for which the available memory has been checked; small problems are not checked.
+    pub(crate) checked: usize,
+    /// Number of Delassus operators assembled so far: the newest version.
+    pub(crate) versions: u64,
+}
+
+impl<T: Real> ProblemRows<T> {
+    /// Memory for the problems of `rows` candidates; rows follow by [`make_room`](Self::make_room).
+    pub(crate) fn new(rows: usize) -> Self {
+        Self {
+            rows: Vec::new(),
+            sorted: Vec::new(),
+            offset: Vec::new(),
+            tolerance: Vec::new(),
+            sets: Vec::new(),
+            multipliers: Vec::new(),
+            own: Vec::new(),
+            scale: Vec::new(),
+            known: KnownForces { delassus: Vec::new(), offset: Vec::new() },
+            reserved: rows.min(FORESEEN),
+            checked: FORESEEN,
+            versions: 0,
+        }
+    }
+
+    /// Memory for `rows` rows.
+    pub(crate) fn make_room(&mut self, rows: usize) {
+        self.rows.reserve(rows);
+        self.sorted.reserve(rows);
+        self.sets.reserve(rows);
+        for values in [&mut self.offset, &mut self.tolerance, &mut self.multipliers] {
+            values.reserve(rows);
+        }
+    }
+}
+
+impl<T: Real> ContactRowsWork<T> {
+    /// Lists the rows of the problem, group by group, and its data. Rows are divided by their weight, which makes W
+    /// symmetric for every kind of row.
+    pub(crate) fn list_problem(
+        &mut self,
+        constraints: &Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        operator: &mut Operator<T>,
+    ) {
+        let Self { y, tolerance, weight, laws, state, curved, problem, .. } = self;
+        let forces = curved.forces(g);
+        let ProblemRows { rows, sorted, offset, tolerance: problem_tolerance, sets, .. } = problem;
+        sorted.clear();
+        constraints.tangents().expand((0..constraints.len()).filter(|&row| state[row].is_in_problem()), sorted);
+        operator.sort(forces, sorted);
+        rows.clear();
+        rows.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
+        offset.clear();
+        problem_tolerance.clear();
+        sets.clear();
+        for &row in rows.iter() {
+            // A row with a known force has no weight.
+            let known = weight[row] == T::zero();
+            offset.push(if known { T::zero() } else { (y[row] + laws.shift[row]) / weight[row] });
+            problem_tolerance.push(if known { T::zero() } else { tolerance[row] / weight[row] });
+            if !forces.is_tangential(row) {
+                sets.push(constraints.set(row));
+            }
+        }
+    }
+}
+
+/// A contact problem in which some normal multipliers are known: their rows are the uncoupled equations λ = force.
+pub(crate) struct KnownForces<T> {
+    delassus: Vec<T>,
+    offset: Vec<T>,
+}
+
+impl<T: Real> KnownForces<T> {
+    /// Poses the problem with the rows whose multiplier is given by `force` uncoupled from all others.
+    pub(crate) fn pose<'p>(
+        &'p mut self,
+        problem: &ContactProblem<'p, T>,
+        force: impl Fn(usize) -> Option<T>,
+    ) -> ContactProblem<'p, T> {
+        let (Self { delassus, offset }, size) = (self, problem.size());
+        delassus.clear();
+        offset.clear();
+        // The diagonal of an uncoupled row is arbitrary, and forces of a static balance are in another unit than W:
+        // the largest of the other diagonals is used.
+        let unknown = (0..size).filter(|&i| force(i).is_none());
+        let largest = unknown.fold(T::zero(), |largest, i| largest.max(problem.delassus(i, i)));
+        let own = |i: usize| if largest > T::zero() { largest } else { problem.delassus(i, i) };
+        for i in 0..size {
+            let known = force(i);
+            let entry = |j: usize| match (i == j, known.is_some() || force(j).is_some()) {
+                (false, true) => T::zero(),
+                (true, _) if known.is_some() => own(i),
+                _ => problem.delassus(i, j),
+            };
+            delassus.extend((0..size).map(entry));
+            offset.push(known.map_or(problem.offset[i], |force| -own(i) * force));
+        }
+        ContactProblem::of(delassus, offset, problem.sets, problem.tolerance, 0)
+    }
+}
