@@ -7,6 +7,7 @@
 //! step, what the stiffness of a contact does, and the restitution of damped laws; `decks.rs` two bridge decks (`deck_models.rs`);
 //! `figure.rs` the figure.
 
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
 mod deck_models;
 mod decks;
 mod figure;

@@ -13,6 +13,7 @@ use example_support::plot::{Axis, BLUE, Curve, GRAY, GREEN, ORANGE, PURPLE, Pane
 
 use std::error::Error;
 
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
 mod tables;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,5 +1,6 @@
 //! The tables of `docs/schemes.md` are those that the code prints.
 
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
 #[path = "../../examples/schemes/tables.rs"]
 mod tables;
 

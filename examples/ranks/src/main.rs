@@ -16,7 +16,7 @@ mod model;
 #[cfg(feature = "petsc")]
 mod multigrid;
 mod partition;
-#[allow(dead_code, unreachable_pub)]
+#[allow(dead_code, clippy::pedantic, reason = "shared with tests/ranks, which uses all of it")]
 #[path = "../../../tests/ranks/parts.rs"]
 mod parts;
 mod restart;
