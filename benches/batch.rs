@@ -7,7 +7,7 @@
 use contact_dynamics::{Automatic, Cholesky, GeneralizedAlpha, LinearRows, LinearSolver, LinearSystem, Simulation};
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{Arguments, median};
+use example_support::timing::{Arguments, median};
 use std::hint::black_box;
 use std::time::Instant;
 

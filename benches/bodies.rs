@@ -4,7 +4,7 @@
 
 use contact_dynamics::{Automatic, ByBody, Composite, LinearRows, LinearSolver, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };

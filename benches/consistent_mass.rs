@@ -7,7 +7,7 @@
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{Composite, LinearRows, LinearSystem, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{Arguments, median};
+use example_support::timing::{Arguments, median};
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };

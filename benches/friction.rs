@@ -8,7 +8,7 @@ use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem,
 use contact_dynamics_scenes::boxes;
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::time::Instant;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };

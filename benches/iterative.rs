@@ -10,7 +10,7 @@ use contact_dynamics::{
     PersistencyCorrection, Simulation,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing;
+use example_support::timing;
 use std::hint::black_box;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };

@@ -9,7 +9,7 @@ use contact_dynamics::{
     Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 

@@ -6,7 +6,7 @@ use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::{Automatic, Composite, Factorization, LinearSolver, Newton, Simulation, System, TangentWeights};
 use contact_dynamics_scenes::hyperelastic::Hyperelastic;
 use contact_dynamics_scenes::large::{Scene, Throw};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -6,7 +6,7 @@ use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::linear_solver::Ordering;
 use contact_dynamics::{Cholesky, Composite, Factorization, LinearSolver};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -6,8 +6,8 @@
 
 use contact_dynamics::{CentralDifference, Cholesky, Composite, LinearRows, Newmark, Real, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
-use contact_dynamics_scenes::yardsticks;
+use example_support::timing::{self, Arguments, Ratio, Table, Unit};
+use example_support::yardsticks;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 

@@ -15,8 +15,9 @@ use contact_dynamics::{
     CentralDifference, Composite, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Real, Simulation,
     TimeIntegrator,
 };
-use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
-use contact_dynamics_scenes::{Bars, yardsticks};
+use contact_dynamics_scenes::Bars;
+use example_support::timing::{self, Arguments, Ratio, Table, Unit};
+use example_support::yardsticks;
 use std::hint::black_box;
 
 const RATIOS: &[Ratio] = &[

@@ -5,7 +5,7 @@
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, Simulation, System};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::hint::black_box;
 use std::time::Instant;
 

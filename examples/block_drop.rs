@@ -4,7 +4,7 @@
 //! flat; with `--quick` n = 5.
 
 use contact_dynamics_scenes::drops::{Drop, LANDINGS};
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::fmt::Write;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -11,8 +11,8 @@
 use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
 use contact_dynamics::faer::MatRef;
 use contact_dynamics_scenes::boxes;
-use contact_dynamics_scenes::output::Output;
 use contact_dynamics_scenes::random::Congruential;
+use example_support::output::Output;
 use std::error::Error;
 use std::fmt::{Display, Write};
 use std::path::Path;

@@ -9,8 +9,8 @@ use contact_dynamics::{
     Composite, ContactLaw, LinearRows, LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
-use contact_dynamics_scenes::output::Output;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use example_support::output::Output;
 use std::error::Error;
 use std::f64::consts::PI;
 use std::fmt::Write;

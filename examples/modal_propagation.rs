@@ -5,10 +5,10 @@
 
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, TimeIntegrator};
-use contact_dynamics_scenes::output::Output;
 use contact_dynamics_scenes::propagated;
 use contact_dynamics_scenes::reduced::{Model, PARENT, Struck, TAPER, bounces, wall_exact, wall_impact};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::Output;
+use example_support::output::decimal;
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;

@@ -15,6 +15,8 @@ pub mod contact_solver;
 pub mod corrector;
 mod dense;
 mod error;
+#[cfg(all(debug_assertions, not(test)))]
+mod instances;
 pub mod integrator;
 mod kernels;
 pub mod linear_solver;
@@ -42,6 +44,9 @@ pub use contact_solver::{ActiveSet, ContactSolver};
 pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
 pub use error::{Error, Result};
 pub use faer;
+#[cfg(all(debug_assertions, not(test)))]
+#[doc(hidden)]
+pub use instances::instances;
 pub use integrator::*;
 pub use linear_solver::{
     Automatic, ByBody, Cholesky, Condensation, ConjugateGradients, Diagonal, Factorization, LinearSolver, Lu,

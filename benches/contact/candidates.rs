@@ -3,7 +3,7 @@
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Simulation};
-use contact_dynamics_scenes::timing::{Arguments, Ratio, Table, Unit};
+use example_support::timing::{Arguments, Ratio, Table, Unit};
 use std::time::Instant;
 
 const RATIOS: &[Ratio] = &[Ratio { heading: "/ without contact", to: &["step without contact"] }];

@@ -3,7 +3,7 @@
 
 use super::pressed::{floor_at, patch, plate, simulation};
 use contact_dynamics::Newmark;
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::time::Instant;
 
 /// Speed of the fall, where the wave speed is about 1.

@@ -5,7 +5,7 @@ use contact_dynamics::{Newmark, NodesOnObstacle, Simulation};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::large::MATERIAL;
 use contact_dynamics_scenes::solids::Solid;
-use contact_dynamics_scenes::timing::{self, Arguments};
+use example_support::timing::{self, Arguments};
 use std::time::Instant;
 
 pub(crate) fn measure(arguments: &Arguments) {

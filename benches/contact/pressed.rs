@@ -4,7 +4,7 @@
 use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
 use contact_dynamics::{ContactConstraint, LinearRows, Newmark, Simulation};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::timing::{self, Arguments, Ratio, Table, Unit};
+use example_support::timing::{self, Arguments, Ratio, Table, Unit};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 

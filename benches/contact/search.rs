@@ -6,7 +6,7 @@ use contact_dynamics::contact::ContactConstraint;
 use contact_dynamics::{Newmark, Simulation};
 use contact_dynamics_scenes::solids::Solid;
 use contact_dynamics_scenes::stacks::Stack;
-use contact_dynamics_scenes::timing::{Arguments, Ratio, Table, Unit};
+use example_support::timing::{Arguments, Ratio, Table, Unit};
 
 const RATIOS: &[Ratio] = &[Ratio { heading: "/ step", to: &["step without contact"] }];
 

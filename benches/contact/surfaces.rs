@@ -6,7 +6,7 @@ use contact_dynamics::contact::ContactConstraint;
 use contact_dynamics::{Newmark, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::solids::Solid;
 use contact_dynamics_scenes::stacks::Stack;
-use contact_dynamics_scenes::timing::{self, Arguments, Table, Unit};
+use example_support::timing::{self, Arguments, Table, Unit};
 
 /// Steps before those that are measured.
 const WARM_UP: usize = 8;

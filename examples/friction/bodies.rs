@@ -2,8 +2,8 @@
 
 use crate::rows::{BATHE, CHUNG_HULBERT, COMPOSITE, Correction, TRAPEZOIDAL, Table};
 use contact_dynamics_scenes::mindlin::Press;
-use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::two_slabs::TwoSlabs;
+use example_support::output::decimal;
 
 pub(crate) fn tables(quick: bool) -> Vec<String> {
     vec![slabs(quick), partial_slip(quick)]

@@ -14,7 +14,7 @@ mod exact;
 mod rows;
 mod slab;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 use std::fmt::Write;
 

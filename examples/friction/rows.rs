@@ -5,7 +5,7 @@ use contact_dynamics::{
     Bathe, CdLagrange, Composite, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result,
     TimeIntegrator,
 };
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// A scheme and what tables call it.

@@ -2,8 +2,8 @@
 
 use crate::rows::{BATHE, CHUNG_HULBERT, COMPOSITE, Correction, TRAPEZOIDAL, Table};
 use contact_dynamics::{Preset, Result, Simulation};
-use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, VERMILION, pair};
 use contact_dynamics_scenes::slabs::{Impact, Slab};
+use example_support::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, VERMILION, pair};
 use std::error::Error;
 
 /// Speeds along the wall with what follows from them.

@@ -7,11 +7,11 @@ use crate::tried::{ahead, clean, corrected, massless, presets, with};
 use contact_dynamics::contact_solver::{ActiveSet, ContactSolver, Pivoting};
 use contact_dynamics::{CentralDifference, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
-use contact_dynamics_scenes::collisions::{Collision, Swept};
 use contact_dynamics_scenes::combinations::{Combination, Correction, plain};
 use contact_dynamics_scenes::masses::Takers;
 use contact_dynamics_scenes::measure::{Record, figures, record_run, try_record_run};
 use contact_dynamics_scenes::sparse::block;
+use example_support::collisions::{Collision, Swept};
 
 /// ρ c A v₀ of the paper's bars, and v₀.
 const FORCE: f64 = 0.0125;

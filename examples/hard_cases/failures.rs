@@ -7,11 +7,11 @@ use crate::table::Bound::{About, AtLeast};
 use crate::table::{Row, each, rows};
 use crate::tried::{paper, trapezoidal};
 use contact_dynamics::{CdLagrange, ContactLaw, GeneralizedAlpha, Gssss, MoreauJean, Newmark, Result};
-use contact_dynamics_scenes::collisions::{Collision, bounces};
 use contact_dynamics_scenes::combinations::{Combination, Correction, plain};
 use contact_dynamics_scenes::large::Swing;
 use contact_dynamics_scenes::masses::Treatment;
 use contact_dynamics_scenes::measure::{Record, figures};
+use example_support::collisions::{Collision, bounces};
 
 const FORCE: f64 = 0.0125;
 const SPEED: f64 = 0.05;

@@ -16,7 +16,7 @@ mod table;
 mod tried;
 mod walls;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use table::Row;
 
 type Anything = Box<dyn std::error::Error>;

@@ -4,10 +4,10 @@ use crate::Extent;
 use crate::table::Bound::AtMost;
 use crate::table::{Row, each, rows};
 use crate::tried::{corrected, massless, presets};
-use contact_dynamics_scenes::collisions::disc;
 use contact_dynamics_scenes::combinations::Combination;
 use contact_dynamics_scenes::disc::SoftDisc;
 use contact_dynamics_scenes::masses::Takers;
+use example_support::collisions::disc;
 
 pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     let (cells, until) = if extent.quick { (8, 20.0) } else { (24, 40.0) };

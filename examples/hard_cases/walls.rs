@@ -5,11 +5,11 @@ use crate::table::Bound::{AtLeast, AtMost};
 use crate::table::{Row, each, rows};
 use crate::tried::{ahead, clean, corrected, massless, presets};
 use contact_dynamics::{Error, Preset, Result, Simulation};
-use contact_dynamics_scenes::collisions::bounces;
 use contact_dynamics_scenes::combinations::{Combination, Correction, listed};
 use contact_dynamics_scenes::masses::{MassMatrix, Takers};
 use contact_dynamics_scenes::schemes;
 use contact_dynamics_scenes::wall_bar::WallBar;
+use example_support::collisions::bounces;
 
 pub(crate) fn cases(extent: &Extent) -> Vec<Row> {
     [bouncing(extent), keeping(extent), resting(extent), settling()].into_iter().flatten().collect()

@@ -9,7 +9,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::hyperelastic::Law;
 use contact_dynamics_scenes::large::{Flight, Swing, Throw};
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::fmt::Write;
 
 type Make = fn() -> Box<dyn TimeIntegrator>;

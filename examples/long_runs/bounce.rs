@@ -4,8 +4,8 @@ use crate::follow::{Followed, number};
 use crate::{COURANT, ELEMENTS, Line, Scene};
 use contact_dynamics::{Result, Simulation};
 use contact_dynamics_scenes::combinations::Combination;
-use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::wall_bar::WallBar;
+use example_support::output::decimal;
 
 /// The bar, its masses as weights, its step, and a run.
 fn bar(row: &Combination, elements: usize, courant: f64) -> Result<(WallBar, Vec<f64>, f64, Simulation<'static, f64>)> {

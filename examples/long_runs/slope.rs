@@ -5,7 +5,7 @@ use crate::{COURANT, ELEMENTS, Line, Scene};
 use contact_dynamics::{ContactLaw, Result, Simulation};
 use contact_dynamics_scenes::combinations::Combination;
 use contact_dynamics_scenes::slabs::Slab;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 
 const GRAVITY: f64 = 10.0;
 /// Its tangent is 0.255; that of the angle of friction is 0.3.

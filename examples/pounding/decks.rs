@@ -1,12 +1,12 @@
 //! Two bridge decks: elastic bodies, whose peak force is a figure of their own.
 
+use crate::deck_models::Decks;
 use crate::models::{RESTITUTION, Scheme};
 use contact_dynamics::{ContactLaw, Preset, Result};
 use contact_dynamics_scenes::damped_contact::DampedLaw;
-use contact_dynamics_scenes::decks::Decks;
 use contact_dynamics_scenes::ground::{GRAVITY, Ground};
 use contact_dynamics_scenes::pounding::{Impacts, Pounding, Record};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 
 use crate::models::{self, Model};
 use crate::tables::Study;
-use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, page};
+use example_support::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, page};
 use std::error::Error;
 use std::ops::Range;
 

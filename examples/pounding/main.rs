@@ -4,15 +4,17 @@
 //! (`pounding.svg`); with `--quick` the ground shakes for four seconds, and references are coarse.
 //!
 //! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, their errors by the
-//! step, what the stiffness of a contact does, and the restitution of damped laws; `decks.rs` two bridge decks;
+//! step, what the stiffness of a contact does, and the restitution of damped laws; `decks.rs` two bridge decks (`deck_models.rs`);
 //! `figure.rs` the figure.
 
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
+mod deck_models;
 mod decks;
 mod figure;
 mod models;
 mod tables;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 use std::fmt::Write;
 

@@ -7,7 +7,7 @@ use contact_dynamics_scenes::damped_contact::{damping_ratio, restitution_of_hert
 use contact_dynamics_scenes::frames::{Figures, Frames};
 use contact_dynamics_scenes::ground::{GRAVITY, Ground};
 use contact_dynamics_scenes::pounding::{Impacts, Pounding};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 use std::sync::Arc;
 

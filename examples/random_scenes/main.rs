@@ -1,13 +1,13 @@
 //! Scenes by chance, as many as there is time for: what must hold in every run is looked at in each, and each is run
 //! twice in ways that must agree. What fails is made as small as it can be and printed.
 //!
-//! `cargo run --release --example random_scenes --features contact-dynamics-scenes/whole -- --seconds 600 --seed 1`;
+//! `cargo run --release --example random_scenes --features contact-dynamics-random-scenes/whole -- --seconds 600 --seed 1`;
 //! `--scene N` looks at a single one. The program fails if a scene does. Without the feature no run goes on from a
 //! file, or by several threads.
 
 mod tally;
 
-use contact_dynamics_scenes::random_scenes::{Recipe, shrunk};
+use contact_dynamics_random_scenes::rows::{Recipe, shrunk};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use tally::Tally;

@@ -1,6 +1,6 @@
 //! What came of many scenes, in tables.
 
-use contact_dynamics_scenes::random_scenes::{KINDS, Precision, Recipe, Verdict};
+use contact_dynamics_random_scenes::rows::{KINDS, Precision, Recipe, Verdict};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::AddAssign;

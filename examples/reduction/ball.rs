@@ -4,7 +4,7 @@ use crate::bars::Table;
 use crate::strikes::{UNTAPERED, models, relative};
 use contact_dynamics_scenes::impact_scenes::Ball;
 use contact_dynamics_scenes::impacts::{Course, Model, Step};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// Steps of Hertz' duration.

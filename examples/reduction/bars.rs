@@ -4,7 +4,7 @@ use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, Newmark, Result, TimeIntegrator};
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::reduced::{Model, Struck, TAPER, bounces, collision, wall_exact, wall_impact};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 pub(crate) type Make = fn() -> Box<dyn TimeIntegrator>;

@@ -7,7 +7,7 @@ use contact_dynamics::reduction::{Boundary, Modes, Reduction};
 use contact_dynamics::{LinearRows, LinearSystem, Result, Simulation};
 use contact_dynamics_scenes::masses::{Body, Takers, Treatment};
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 
 /// Wave speed 11.6, so that a unit length is crossed and recrossed in 0.17.
 const SOFT: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 };

@@ -4,8 +4,8 @@
 use crate::blocks::Block;
 use contact_dynamics::reduction::{Boundary, Modes, Reduction};
 use contact_dynamics::{LinearSystem, Result, Simulation};
-use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, SKY, VERMILION, page};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
+use example_support::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, SKY, VERMILION, page};
 use std::error::Error;
 use std::fmt::Write;
 use std::time::Instant;

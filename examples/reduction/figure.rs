@@ -2,8 +2,8 @@
 
 use crate::bars::{TAPERED, bathe};
 use contact_dynamics::reduction::Boundary;
-use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, VERMILION, banner};
 use contact_dynamics_scenes::reduced::{Model, TAPER, wall_exact, wall_force};
+use example_support::plot::{Axis, BLUE, Curve, DARK, Panel, RGBColor, VERMILION, banner};
 use std::error::Error;
 
 /// Step, and modes.

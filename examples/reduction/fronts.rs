@@ -3,7 +3,7 @@
 use crate::bars::{TAPERED, Table, bathe, phases};
 use contact_dynamics_scenes::front::{Front, best_softening, ringing};
 use contact_dynamics_scenes::reduced::wall_impact;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// Fronts of tapers beside the measured force of the bar, and the softening of least error for each exponent.

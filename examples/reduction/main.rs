@@ -20,7 +20,7 @@ mod ring;
 mod softenings;
 mod strikes;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

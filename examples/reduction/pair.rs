@@ -4,7 +4,7 @@ use crate::bars::Table;
 use crate::strikes::{models, relative};
 use contact_dynamics_scenes::impact_scenes::{fastest_wave, plane_force, two_blocks};
 use contact_dynamics_scenes::impacts::{Course, Model, Step};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// Finer by so much is the reference, in space and in time.

@@ -5,7 +5,7 @@ use crate::strikes::{cost, models};
 use contact_dynamics::Result;
 use contact_dynamics_scenes::impact_scenes::ring;
 use contact_dynamics_scenes::impacts::{Course, Model, Step};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// Speeds, over that of waves. The force is one of many short impacts that no two models share one by one: means over

@@ -4,7 +4,7 @@ use crate::bars::Table;
 use crate::strikes::Kind;
 use contact_dynamics_scenes::impact_scenes::{Ball, fastest_wave, two_blocks};
 use contact_dynamics_scenes::impacts::{Impact, Model, Step};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// Errors against the whole model on the same mesh.

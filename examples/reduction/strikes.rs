@@ -2,7 +2,7 @@
 
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics_scenes::impacts::{Course, Model, Step};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 
 /// A boundary and a softening.
 #[derive(Clone, Copy)]

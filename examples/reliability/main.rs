@@ -19,7 +19,7 @@ mod squeezes;
 mod stability;
 mod start;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::fmt::Write;
 
 type Anything = Box<dyn std::error::Error>;

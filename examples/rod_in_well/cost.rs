@@ -2,9 +2,9 @@
 
 use crate::drag::{ALL, Way};
 use contact_dynamics::{GeneralizedAlpha, Result, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::tables::decimal;
-use contact_dynamics_scenes::timing;
 use contact_dynamics_scenes::well::{Rod, ramp};
+use example_support::output::decimal;
+use example_support::timing;
 use std::fmt::Write;
 use std::time::Instant;
 

@@ -4,8 +4,8 @@ use contact_dynamics::{
     CdLagrange, ContactStatus, Corrector, GeneralizedAlpha, MoreauJean, Newmark, PersistencyCorrection, Result,
     Simulation, TimeIntegrator,
 };
-use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::well::{Rod, ramp};
+use example_support::output::decimal;
 use std::fmt::Write;
 
 /// The velocity of the top once it moves, and the step.

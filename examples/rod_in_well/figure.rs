@@ -2,8 +2,8 @@
 
 use crate::drag::{CD_LAGRANGE, CORRECTED, TRAPEZOIDAL_RAW, states};
 use crate::wave;
-use contact_dynamics_scenes::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, page};
 use contact_dynamics_scenes::well::{Rod, ramp};
+use example_support::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, page};
 use std::error::Error;
 
 /// What panels show of one run of the drill pipe.

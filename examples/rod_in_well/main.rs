@@ -12,7 +12,7 @@ mod figure;
 mod wave;
 
 use contact_dynamics::Result;
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 use std::fmt::Write;
 

@@ -2,8 +2,8 @@
 
 use crate::drag::{CD_LAGRANGE, CORRECTED, MOREAU_JEAN, RAW, TRAPEZOIDAL, TRAPEZOIDAL_RAW};
 use contact_dynamics::Result;
-use contact_dynamics_scenes::tables::decimal;
 use contact_dynamics_scenes::well::{Rod, Well};
+use example_support::output::decimal;
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 

@@ -8,12 +8,13 @@ use contact_dynamics::{
     Bathe, Bdf2, CentralDifference, ChungLee, Composite, GeneralizedAlpha, Houbolt, HulbertChung, Newmark, NohBathe,
     Park, TchamwaWielgosz,
 };
-use contact_dynamics_scenes::output::Output;
-use contact_dynamics_scenes::plot::{
-    Axis, BLUE, Curve, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION, page,
-};
-use contact_dynamics_scenes::tables;
+use example_support::output::Output;
+use example_support::plot::{Axis, BLUE, Curve, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION, page};
+
 use std::error::Error;
+
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
+mod tables;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let output = Output::from_command_line("schemes")?;

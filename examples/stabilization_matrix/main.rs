@@ -5,7 +5,7 @@
 //! figure and all numbers (`stabilization_matrix.csv`); with `--quick` meshes are coarse, phases two, and times are not
 //! measured.
 //!
-//! `combinations.rs` has the rows, by rules; what is measured of them is in `tests/scenes/src/collisions.rs`.
+//! `combinations.rs` has the rows, by rules; what is measured of them is in `examples/support/src/collisions.rs`.
 
 mod combinations;
 mod pareto;
@@ -13,10 +13,10 @@ mod report;
 
 use combinations::Combination;
 use contact_dynamics::Error as Refused;
-use contact_dynamics_scenes::collisions::{Collision, Swept, bounces, disc};
 use contact_dynamics_scenes::disc::SoftDisc;
-use contact_dynamics_scenes::output::Output;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::collisions::{Collision, Swept, bounces, disc};
+use example_support::output::Output;
+use example_support::output::decimal;
 use report::{Cell, Column, Results, table};
 use std::error::Error;
 use std::fmt::Write;

@@ -3,7 +3,7 @@
 use crate::combinations::{Combination, Correction};
 use crate::report::Results;
 use contact_dynamics_scenes::masses::Treatment;
-use contact_dynamics_scenes::plot::{
+use example_support::plot::{
     Axis, BLUE, Cloud, DARK, GRAY, GREEN, Key, Mark, ORANGE, PURPLE, RGBColor, VERMILION, scatter,
 };
 use std::error::Error;

@@ -1,8 +1,8 @@
 //! Tables in Markdown, and all figures as comma-separated values.
 
 use crate::combinations::Combination;
-use contact_dynamics_scenes::collisions::Swept;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::collisions::Swept;
+use example_support::output::decimal;
 
 /// What was measured of all combinations in one scene.
 pub(crate) struct Results {

@@ -1,6 +1,6 @@
 //! Scenes by chance of all constraints with all that they can be given: what is refused, what gains energy.
 
-use contact_dynamics_scenes::by_chance::{Figures, Meeting, Variant, meetings, run};
+use contact_dynamics_random_scenes::surfaces::{Figures, Meeting, Variant, meetings, run};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Write;

@@ -2,7 +2,7 @@
 
 use contact_dynamics::contact::ContactConstraint;
 use contact_dynamics_scenes::hertz::{Cylinders, HertzErrors};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::error::Error;
 use std::fmt::Write;
 

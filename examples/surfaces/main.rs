@@ -13,7 +13,7 @@ mod rebound;
 mod rings;
 mod ties;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -2,7 +2,7 @@
 
 use super::rings::{CONTACTS, END, Rings, SPEED};
 use contact_dynamics::EnergyMomentum;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::error::Error;
 use std::fmt::Write;
 

@@ -5,12 +5,10 @@
 
 mod scenes;
 
-use contact_dynamics_scenes::output::Output;
-use contact_dynamics_scenes::plot::{
-    Axis, BLUE, Curve, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION, page,
-};
 use contact_dynamics_scenes::schemes::all;
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::Output;
+use example_support::output::decimal;
+use example_support::plot::{Axis, BLUE, Curve, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION, page};
 use scenes::{Scene, damped_bar, stiff_soft};
 use std::error::Error;
 use std::fmt::Write;

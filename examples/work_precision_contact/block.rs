@@ -6,7 +6,7 @@ use contact_dynamics::mass::affine_motions;
 use contact_dynamics::{ContactLaw, LinearRows, Result, Simulation};
 use contact_dynamics_scenes::masses::Body;
 use contact_dynamics_scenes::solids::{Material, Solid};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
 use std::collections::BTreeMap;
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };

@@ -15,8 +15,8 @@ mod slab;
 
 use bars::{Bouncing, DISSIMILAR, EQUAL};
 use block::Block;
-use contact_dynamics_scenes::output::Output;
-use contact_dynamics_scenes::plot::{Axis, Panel, page};
+use example_support::output::Output;
+use example_support::plot::{Axis, Panel, page};
 use report::{Results, Targets};
 use scene::{Extent, Scene, measure};
 use slab::Sticking;

@@ -2,10 +2,8 @@
 
 use crate::rows::{REFERENCE, Row};
 use crate::scene::{Errors, Point};
-use contact_dynamics_scenes::plot::{
-    Axis, BLUE, Curve, DARK, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION,
-};
-use contact_dynamics_scenes::tables::decimal;
+use example_support::output::decimal;
+use example_support::plot::{Axis, BLUE, Curve, DARK, GRAY, GREEN, ORANGE, PURPLE, Panel, RGBColor, SKY, VERMILION};
 use std::fmt::Write;
 
 /// Errors at which work is compared: mean and RMS of the force, energy.

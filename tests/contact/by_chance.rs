@@ -2,7 +2,7 @@
 //! units and with facets in another order.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
-use contact_dynamics_scenes::by_chance::{Figures, Meeting, Variant, meetings, run};
+use contact_dynamics_random_scenes::surfaces::{Figures, Meeting, Variant, meetings, run};
 
 /// All scenes of a few seeds.
 fn scenes(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (Meeting, u64)> {

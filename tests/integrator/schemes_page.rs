@@ -1,6 +1,8 @@
 //! The tables of `docs/schemes.md` are those that the code prints.
 
-use contact_dynamics_scenes::tables;
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
+#[path = "../../examples/schemes/tables.rs"]
+mod tables;
 
 const PAGE: &str = include_str!("../../docs/schemes.md");
 

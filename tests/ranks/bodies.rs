@@ -1,10 +1,10 @@
 //! The bodies of these tests, in one piece and over ranks, and what is recorded of their runs.
 
+use crate::parts::{Gathered, Meeting, SolidPart, on_ranks};
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{
     ContactConstraint, ContactLaw, LinearRows, LinearSystem, NodesOnObstacle, Result, Simulation, SimulationBuilder,
 };
-use contact_dynamics_scenes::ranks::{Gathered, Meeting, SolidPart, on_ranks};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! A run that is saved over some ranks goes on over others, or in one piece.
 
 use crate::bodies::{Blocks, Seen, difference, linear, linear_part, record};
+use crate::parts::{SolidPart, on_ranks};
 use contact_dynamics::{Bathe, Checkpoint, Composite, Error, LinearSystem, Newmark, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::ranks::{SolidPart, on_ranks};
 use contact_dynamics_scenes::sparse::{matrix, springs};
 
 const H: f64 = 2e-3;

@@ -1,12 +1,12 @@
 //! Runs over ranks move as those in one piece, and contact forces are the same on all ranks to the bit.
 
 use crate::bodies::{Blocks, Setting, largest_difference, linear, linear_part};
+use crate::parts::HyperelasticPart;
 use contact_dynamics::{
     Bathe, CentralDifference, Composite, EnergyMomentum, GeneralizedAlpha, Newmark, Newton, Simulation,
     SimulationBuilder, StepControl, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
-use contact_dynamics_scenes::ranks::HyperelasticPart;
 
 /// Rounding of sums in another order, over some dozens of steps with impacts.
 const SAME: f64 = 1e-10;

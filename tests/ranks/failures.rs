@@ -2,11 +2,11 @@
 //! and the run goes on. Nobody waits in vain.
 
 use crate::bodies::{Blocks, Seen, linear_part, record};
+use crate::parts::{HyperelasticPart, SolidPart, on_ranks};
 use contact_dynamics::observer::{Control, StepView};
 use contact_dynamics::{Composite, Error, Newton, Outcome, Result, Simulation, SimulationBuilder, StepControl};
 use contact_dynamics_scenes::hosts::Hooked;
 use contact_dynamics_scenes::hyperelastic::Law;
-use contact_dynamics_scenes::ranks::{HyperelasticPart, SolidPart, on_ranks};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const RANKS: usize = 3;

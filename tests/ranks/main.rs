@@ -5,4 +5,6 @@ mod bodies;
 mod checkpoint;
 mod equal;
 mod failures;
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
+mod parts;
 mod refusals;

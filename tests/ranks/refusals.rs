@@ -1,6 +1,7 @@
 //! What runs over ranks refuse when they are built, on all ranks.
 
 use crate::bodies::{Blocks, linear_part};
+use crate::parts::{Part, SolidPart, on_ranks};
 use contact_dynamics::faer::sparse::{Pair, SymbolicSparseColMat};
 use contact_dynamics::ranks::{Ranks, parts};
 use contact_dynamics::{
@@ -8,7 +9,6 @@ use contact_dynamics::{
     SimulationBuilder,
 };
 use contact_dynamics_scenes::hosts::Bare;
-use contact_dynamics_scenes::ranks::{Part, SolidPart, on_ranks};
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Some of the scenes that `--example random_scenes` draws by the thousand, and how it makes them smaller.
 
-use contact_dynamics_scenes::random_scenes::{KINDS, Recipe, shrunk};
+use contact_dynamics_random_scenes::rows::{KINDS, Recipe, shrunk};
 
 #[test]
 fn scenes_by_chance_hold_what_must_hold() {

@@ -2,10 +2,10 @@
 //! rigid contact, with friction and without, and with dofs without mass, whose velocities are differenced over two
 //! steps.
 
+use crate::independent::Bodies;
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
-use contact_dynamics_scenes::truth::Bodies;
 
 #[test]
 fn runs_whose_step_changes_are_those_of_the_truth() {

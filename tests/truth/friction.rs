@@ -1,9 +1,9 @@
 //! Rigid contact with Coulomb's friction in the plane: every scheme, with every correction that knows friction.
 
+use crate::independent::Bodies;
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
-use contact_dynamics_scenes::truth::Bodies;
 
 /// Columns as in `rigid.rs`.
 pub(crate) const TABLE: &str = "\

@@ -1,9 +1,9 @@
 //! Laws of contact besides the rigid one, beside rigid rows and without, with and without friction: every scheme.
 
+use crate::independent::Bodies;
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
-use contact_dynamics_scenes::truth::Bodies;
 
 /// With stiffnesses in units of a spring of the scene, and the mass in those of k h².
 const LAWS: [ContactLaw; 10] = [

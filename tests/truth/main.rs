@@ -5,6 +5,8 @@
 
 mod changes;
 mod friction;
+#[allow(clippy::pedantic, reason = "numerics, with the lints of tests/scenes")]
+mod independent;
 mod laws;
 mod massless;
 mod newton;

@@ -1,12 +1,12 @@
 //! Dofs without mass, damped and not, some of which touch: every scheme with every correction, on rigid contact, with
 //! friction and without. Implicit stages solve for them with the others, explicit ones before.
 
+use crate::independent::Bodies;
 use crate::sweep::Sweep;
 use crate::{friction, rigid};
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
 use contact_dynamics_scenes::schemes::{self, Listed};
-use contact_dynamics_scenes::truth::Bodies;
 
 /// What these schemes do with dofs without mass that others do not: refuse them, or, explicit ones, what is damped there.
 const APART: [(&str, &str); 10] = [

@@ -1,11 +1,11 @@
 //! Springs that harden, by Newton's method: every scheme with every correction, on rigid contact, with friction and
 //! without.
 
+use crate::independent::Bodies;
 use crate::rigid;
 use crate::sweep::{ALONG_PATHS, Sweep};
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
-use contact_dynamics_scenes::truth::Bodies;
 
 #[test]
 fn runs_by_newtons_method_are_those_of_the_truth() {

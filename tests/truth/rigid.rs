@@ -1,9 +1,9 @@
 //! Rigid contact without friction: every scheme with every correction.
 
+use crate::independent::Bodies;
 use crate::sweep::Sweep;
 use contact_dynamics::ContactLaw;
 use contact_dynamics_scenes::combinations::Correction;
-use contact_dynamics_scenes::truth::Bodies;
 
 /// One column a correction, in the order of `Correction::ALL`: none, λ_v/λ_a, the same with the past projected, release
 /// after it, Taylor–Papadopoulos, splitting, contact-implicit, contact-stabilized, the same on closed contacts,

@@ -1,9 +1,9 @@
 //! Scenes by chance, run with every scheme and some corrections, and what came of them.
 
+use crate::independent::{Bodies, Compared, Kind, Outcome, Scene, Setting, compare};
 use contact_dynamics::{ContactLaw, Error, analysis};
 use contact_dynamics_scenes::combinations::Correction;
 use contact_dynamics_scenes::schemes;
-use contact_dynamics_scenes::truth::{Bodies, Compared, Kind, Outcome, Scene, Setting, compare};
 use std::fmt::Write;
 
 /// Largest difference, over the size of what is compared.
@@ -130,14 +130,17 @@ impl Sweep<'_> {
                     Err(Error::ContradictoryContacts { .. })
                         if bodies == Bodies::Massless && listed.critical.is_some() => {}
                     Err(error) => differences.push(format!("{place}: {error}")),
-                    Ok(Outcome::Refused(_)) => {
+                    Ok(Outcome::Refused) => {
                         pair.refused += 1;
                         pair.refused_undamped += usize::from(scene.damping.is_none());
                     }
                     Ok(Outcome::Compared(run)) => {
                         let deviation = &run.worst;
                         if deviation.size > TOLERANCE {
-                            differences.push(format!("{place}: {deviation:?} of {} steps", run.steps));
+                            differences.push(format!(
+                                "{place}: {} differs by {} in step {} of {}",
+                                deviation.what, deviation.size, deviation.step, run.steps
+                            ));
                         }
                         *worst = worst.max(deviation.size);
                         pair.runs.push(run);

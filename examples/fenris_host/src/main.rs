@@ -1,10 +1,10 @@
 //! Bodies of the finite-element crate fenris in impact: mesh, elements, materials and assembly are fenris's, time and
 //! contact are contact-dynamics'.
 //!
-//! `cargo run --release -p fenris-host` runs a slab against a wall (exact force), a disc thrown at a floor with
-//! friction, and a rubber block at large strains; with `--quick` on coarse meshes. `--output DIR` is where the report
-//! goes. What lies between the two crates is glue.rs; elastic.rs asks fenris for matrices, hyperelastic.rs is a
-//! `System` that asks fenris for force and tangent.
+//! `cargo run --release --manifest-path examples/fenris_host/Cargo.toml` runs a slab against a wall (exact force), a
+//! disc thrown at a floor with friction, and a rubber block at large strains; with `--quick` on coarse meshes.
+//! `--output DIR` is where the report goes. What lies between the two crates is glue.rs; elastic.rs asks fenris for
+//! matrices, hyperelastic.rs is a `System` that asks fenris for force and tangent.
 
 mod block;
 mod disc;
@@ -14,7 +14,7 @@ mod hyperelastic;
 mod scene;
 mod slab;
 
-use contact_dynamics_scenes::output::Output;
+use example_support::output::Output;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -10,7 +10,7 @@ use contact_dynamics::{
     Simulation, SimulationBuilder, System,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
-use contact_dynamics_scenes::ranks::HyperelasticPart;
+use crate::parts::HyperelasticPart;
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.25, density: 1.0 };

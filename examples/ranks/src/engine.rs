@@ -8,7 +8,7 @@ use crate::multigrid::Multigrid;
 use crate::share::Share;
 use crate::solver::{Direct, Way};
 use contact_dynamics::LinearSolver;
-use contact_dynamics_scenes::ranks::Cut;
+use crate::parts::Cut;
 use std::sync::Arc;
 
 /// A solver that spans ranks.

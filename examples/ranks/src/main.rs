@@ -16,6 +16,9 @@ mod model;
 #[cfg(feature = "petsc")]
 mod multigrid;
 mod partition;
+#[allow(dead_code, clippy::pedantic, reason = "shared with tests/ranks, which uses all of it")]
+#[path = "../../../tests/ranks/parts.rs"]
+mod parts;
 mod restart;
 mod scale;
 mod share;

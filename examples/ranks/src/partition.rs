@@ -6,7 +6,7 @@ use crate::share::{Share, host};
 use contact_dynamics::faer::sparse::{Pair, SymbolicSparseColMat};
 use contact_dynamics::ranks::parts;
 use contact_dynamics::{Error, Result};
-use contact_dynamics_scenes::ranks::Cut;
+use crate::parts::Cut;
 use std::sync::Arc;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -157,35 +157,3 @@ pub fn ring(cells: [usize; 2], speed: f64, angle: f64) -> Result<Impact> {
     let part = Part::new(&solid, &touching, Vec::new(), -speed)?;
     Ok(Impact { parts: vec![part], rows, until: 4.0 * PI / ring_frequency(2) })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_course_of_hertz_has_his_force_duration_and_impulse() {
-        let ball = Ball::new(0.15, 2, [5, 5, 7]).unwrap();
-        let PowerLawImpact { mass, velocity, .. } = ball.hertz;
-        let course = ball.exact(ball.hertz.duration() / 100.0);
-        let first = ball.gap / velocity;
-        assert!((course.largest() / (0.25 * ball.hertz.force()) - 1.0).abs() < 1e-5);
-        assert!(((course.last - first) / ball.hertz.duration() - 1.0).abs() < 2e-3);
-        // Momentum turns around.
-        assert!((course.impulse / (0.25 * 2.0 * mass * velocity) - 1.0).abs() < 1e-5);
-        // Of a quarter of the ball, without what facets cut off.
-        let share = ball.impact.parts[0].mass() / (0.25 * mass);
-        assert!(share < 1.0 && share > 0.95, "{share}");
-    }
-
-    #[test]
-    fn the_faces_of_two_blocks_meet_node_on_node() {
-        let impact = two_blocks(8).unwrap();
-        let [lower, upper] = [&impact.parts[0], &impact.parts[1]];
-        assert_eq!((impact.rows.len(), lower.body.contact.len(), upper.body.contact.len()), (9, 9, 9));
-        for (part, (width, height, density)) in
-            [lower, upper].into_iter().zip([(2.0, 1.0, LOWER.density), (1.0, 0.75, UPPER.density)])
-        {
-            assert!((part.mass() - width * height * density).abs() < 1e-9);
-        }
-    }
-}

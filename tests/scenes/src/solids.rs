@@ -204,7 +204,7 @@ impl Solid<2> {
 
 impl<const D: usize> Solid<D> {
     /// The unit cube cut into `cells`, its nodes placed by `place`.
-    pub(crate) fn grid(cells: [usize; D], material: Material, place: impl Fn([f64; D]) -> [f64; D]) -> Self {
+    pub fn grid(cells: [usize; D], material: Material, place: impl Fn([f64; D]) -> [f64; D]) -> Self {
         let points = cells.map(|n| n + 1);
         let split = |mut index: usize, sizes: [usize; D]| -> [usize; D] {
             std::array::from_fn(|axis| {
@@ -374,88 +374,5 @@ impl<const D: usize> Solid<D> {
     /// The dofs of all nodes.
     pub fn node_dofs(&self) -> Vec<[usize; D]> {
         (0..self.nodes.len()).map(|node| std::array::from_fn(|axis| Self::dof(node, axis))).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const STEEL: Material = Material { young: 210.0, poisson: 0.3, density: 7.8 };
-
-    fn product(k: &SparseColMat<usize, f64>, x: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; x.len()];
-        for (j, &xj) in x.iter().enumerate() {
-            let k = k.as_ref();
-            for (&i, &value) in k.row_idx_of_col_raw(j).iter().zip(k.val_of_col(j)) {
-                y[i] += value * xj;
-            }
-        }
-        y
-    }
-
-    #[test]
-    fn distorted_meshes_pass_the_patch_test() {
-        let bend = |p: [f64; 3]| [p[0] + 0.1 * p[1] * p[2], p[1] + 0.07 * p[0] * p[0], p[2] - 0.05 * p[0] * p[1]];
-        let block = Solid::block([1.0, 2.0, 1.5], [3, 4, 3], STEEL).mapped(bend);
-        // A uniform strain gives no force on interior nodes, whatever the mesh.
-        let strain = [[1e-3, 2e-4, -3e-4], [2e-4, -4e-4, 1e-4], [-3e-4, 1e-4, 5e-4]];
-        let u: Vec<f64> =
-            block.nodes.iter().flat_map(|p| strain.map(|e| e.iter().zip(p).map(|(e, x)| e * x).sum())).collect();
-        let f = product(&block.stiffness(), &u);
-        let surface = block.surface_nodes();
-        let largest = f.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        for node in (0..block.nodes.len()).filter(|n| surface.binary_search(n).is_err()) {
-            assert!((0..3).all(|axis| f[3 * node + axis].abs() < 1e-12 * largest));
-        }
-        // Work of the strain: ½ ε:σ V with the volume of the block.
-        let volume = block.lumped_mass::<f64>().iter().step_by(3).sum::<f64>() / STEEL.density;
-        let [lambda, mu] = STEEL.lame();
-        let trace: f64 = (0..3).map(|i| strain[i][i]).sum();
-        let square: f64 = strain.iter().flatten().map(|e| e * e).sum();
-        let energy: f64 = 0.5 * u.iter().zip(&f).map(|(u, f)| u * f).sum::<f64>();
-        assert!((energy / (volume * (0.5 * lambda * trace * trace + mu * square)) - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn plane_strain_is_a_slice_of_the_solid() {
-        let plate = Solid::disc(2.0, 6, STEEL);
-        let shear: Vec<f64> = plate.nodes.iter().flat_map(|[x, y]| [1e-3 * y, 2e-3 * x]).collect();
-        let energy: f64 = 0.5 * product(&plate.stiffness(), &shear).iter().zip(&shear).map(|(f, u)| f * u).sum::<f64>();
-        let area = plate.lumped_mass::<f64>().iter().step_by(2).sum::<f64>() / STEEL.density;
-        assert!((area / (std::f64::consts::PI * 4.0) - 1.0).abs() < 0.05, "{area}");
-        let gamma: f64 = 3e-3;
-        assert!((energy / (0.5 * STEEL.lame()[1] * gamma * gamma * area) - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn boundaries_are_closed_and_point_outward() {
-        let ball = Solid::quarter_ball(1.0, [4, 4, 6], 0.1, STEEL);
-        let volume = ball.lumped_mass::<f64>().iter().step_by(3).sum::<f64>() / STEEL.density;
-        // Divergence theorem with the triangles of each side.
-        let enclosed: f64 = ball
-            .boundary()
-            .iter()
-            .flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]])
-            .map(|t| {
-                let [a, b, c] = t.map(|n| ball.nodes[n]);
-                (a[0] * (b[1] * c[2] - b[2] * c[1])
-                    + a[1] * (b[2] * c[0] - b[0] * c[2])
-                    + a[2] * (b[0] * c[1] - b[1] * c[0]))
-                    / 6.0
-            })
-            .sum();
-        assert!((enclosed / volume - 1.0).abs() < 0.02, "{enclosed} {volume}");
-        assert!((volume / (std::f64::consts::PI / 3.0) - 1.0).abs() < 0.1, "{volume}");
-        let disc = Solid::ring([1.0, 2.0], [2, 40], STEEL);
-        let twice: f64 = disc
-            .boundary()
-            .iter()
-            .map(|s| {
-                let [a, b] = [disc.nodes[s[0]], disc.nodes[s[1]]];
-                a[0] * b[1] - a[1] * b[0]
-            })
-            .sum();
-        assert!((twice / 2.0 / (3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01);
     }
 }

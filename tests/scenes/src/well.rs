@@ -324,24 +324,3 @@ pub fn ramp(velocity: f64, time: f64) -> impl Fn(f64) -> [f64; 3] + Clone {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{Rod, arc_tension};
-
-    #[test]
-    fn the_soft_string_is_that_of_the_closed_forms() {
-        let mut rod = Rod::drill_pipe(10);
-        rod.tail = 4e5;
-        let profile = rod.soft_string(1.0, 2);
-        let [start, end] = rod.well.inclination;
-        let straight = rod.length - rod.well.end_of_arc();
-        let tangent = rod.tail + rod.weight * straight * (end.cos() + rod.friction * end.sin());
-        let arc = arc_tension(rod.friction, rod.weight, rod.well.radius, [tangent, end], start);
-        let top = arc + rod.weight * rod.well.kick_off;
-        assert!((profile[0][1] / top - 1.0).abs() < 1e-9, "{} {top}", profile[0][1]);
-        // Without weight it is a rope on a capstan.
-        let capstan = arc_tension(0.25, 0.0, 573.0, [1.0, end], start);
-        assert!((capstan / (0.25 * end).exp() - 1.0).abs() < 1e-14);
-    }
-}
