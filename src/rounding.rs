@@ -23,3 +23,13 @@ pub(crate) fn share_of_rounding<T: Real>() -> T {
 pub(crate) fn touching<T: Real>(way: T) -> T {
     T::of(1e-10) * way + rounding(way)
 }
+
+/// √ε, as a share: of a facet's size, distances below it are rounding, so that they have no direction; entries of a
+/// rotation differ by less than it from those of an orthonormal matrix.
+pub(crate) fn root_of_rounding<T: Real>() -> T {
+    T::epsilon().sqrt()
+}
+
+/// The covered share of a node's area below which the node has no row: weights divided by less would be rounding.
+#[cfg(feature = "mesh-contact")]
+pub(crate) const LEAST_COVER: f64 = 1e-6;

@@ -105,7 +105,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             // Reserves memory for the largest constraint.
             scratch.clear();
             constraint.contacts(&mut scratch);
-            room += contacts.len() + contacts.rubbing_rows();
+            room += contacts.len() + contacts.friction_rows();
             own.push(Part {
                 variation: constraint.variation(),
                 inspects: constraint.inspects(),
@@ -319,8 +319,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                     ids.push(contact);
                 }
                 let law = contacts.law(row);
-                law.check()?;
-                law.check_scalar::<T>()?;
+                law.check::<T>()?;
                 admitted.check(law)?;
                 laws.push(law);
                 let magnitude = contacts.magnitude(row);

@@ -61,5 +61,5 @@ pub(crate) fn recovery_of<T: Real>(said: T, law: ContactLaw) -> Result<T> {
         let (name, range) = ("the depth by which a contact comes out in a step", "from 0");
         return Err(Error::Parameter { name, value: said.value(), range });
     }
-    Ok(if law.keeps_depths() { said } else { T::infinity() })
+    Ok(law.recovery(said))
 }
