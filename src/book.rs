@@ -15,7 +15,7 @@ pages! {
     Readme = "README.md";
     Start = "docs/start.md";
     Choosing = "docs/choosing.md";
-    #[cfg(feature = "search")]
+    #[cfg(feature = "mesh-contact")]
     Contact = "docs/contact.md";
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";

@@ -1,41 +1,43 @@
 //! Contact constraints: gaps, normals and contact laws.
 
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod affine_rows;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod body_contact;
 mod bond;
 mod constraint;
 mod contacts;
 mod dofs;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod edge_to_edge;
 mod gap_function;
 mod gaps;
 mod groups;
 mod law;
 mod linear_rows;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod mortar;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod node_to_facet;
 mod nodes_on_obstacle;
 mod obstacle;
 mod rigid_motion;
 mod rows;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod surface;
+#[cfg(feature = "mesh-contact")]
+mod surface_settings;
 mod tangents;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod tie;
 
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use body_contact::BodyContact;
-pub use bond::{BondStrength, BrokenBond};
+pub use bond::BrokenBond;
 pub use constraint::{Candidates, ContactConstraint, Rates, Stride, Variation};
 pub(crate) use contacts::kept_depth;
 pub use contacts::{Contact, Contacts};
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use edge_to_edge::EdgeToEdge;
 pub use gap_function::GapFunction;
 pub(crate) use gaps::{ErasedGaps, Gaps};
@@ -43,21 +45,25 @@ pub(crate) use groups::Groups;
 pub use law::ContactLaw;
 pub(crate) use law::{Course, Measure};
 pub use linear_rows::{GapOffset, LinearRows};
-#[cfg(feature = "search")]
-pub use mortar::Mortar;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
+pub use mortar::{BondStrength, Mortar};
+#[cfg(feature = "mesh-contact")]
 pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use obstacle::ClosedSurface;
 pub use obstacle::{Capsule, Cone, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 pub use rigid_motion::RigidMotion;
 pub use rows::{ContactJacobian, GapRates};
 pub(crate) use rows::{NO_RESPONSE, SpreadRow};
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use surface::{Facet, Surface};
+#[cfg(feature = "mesh-contact")]
+pub use surface_settings::SurfaceSettings;
+#[cfg(feature = "mesh-contact")]
+use surface_settings::surface_settings;
 pub(crate) use tangents::Tangents;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use tie::Tie;
 
 pub use crate::contact_id::ContactId;
@@ -103,7 +109,7 @@ fn check_nodes(what: &'static str, nodes: &[usize], count: usize) -> Result<()> 
 
 /// Whether plastic impacts along two normals would take shares of a body's kinetic energy that differ by more than a
 /// tenth. `speeds` are its velocity components along them, `square` is the square of its velocity.
-pub(crate) fn press_differently(speeds: [f64; 2], square: f64) -> bool {
+pub(crate) fn impacts_differ(speeds: [f64; 2], square: f64) -> bool {
     (speeds[0] * speeds[0] - speeds[1] * speeds[1]).abs() > 0.1 * square
 }
 
@@ -116,3 +122,17 @@ pub(crate) const LARGEST_TURN: f64 = 0.866;
 
 /// Largest error of a linearized gap, and largest gap of a stopped node, as a share of its displacement in the step.
 pub(crate) const LARGEST_MISS: f64 = 0.1;
+
+/// Relative motion in a step, as a share of the smallest facet or edge, up to which bodies are not checked: they cannot
+/// pass through anything larger than that.
+#[cfg(feature = "mesh-contact")]
+pub(crate) const FINE: f64 = 0.125;
+
+/// The same limit for the check of the normal along which bodies were stopped. Below it a row lets its node in only
+/// over an edge, where the normal is not unique.
+#[cfg(feature = "mesh-contact")]
+pub(crate) const COARSE: f64 = 0.6;
+
+/// Gap, as a share of the reach, above which a row that has lost its facet surely does not press.
+#[cfg(feature = "mesh-contact")]
+pub(crate) const OPEN: f64 = 0.01;

@@ -3,7 +3,7 @@
 //! shares generic functions between crates at optimization levels 0 and 1 only.)
 
 use crate::contact::{Capsule, Cone, Cuboid, Cylinder, GapFunction, Obstacle, Plane, Sphere};
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 use crate::contact::{ClosedSurface, EdgeToEdge, Mortar, NodeToFacet, Tie};
 use crate::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use crate::corrector::{
@@ -47,16 +47,16 @@ pub fn instances() -> Vec<*const ()> {
     all.extend(by_trait!(dyn ContactConstraint<f64>:
         LinearRows<'static, f64>, NodesOnObstacle<'static, f64, 2>, NodesOnObstacle<'static, f64, 3>,
         GapFunction<'static, f64>));
-    #[cfg(feature = "search")]
+    #[cfg(feature = "mesh-contact")]
     all.extend(by_trait!(dyn ContactConstraint<f64>:
         NodeToFacet<f64>, EdgeToEdge<f64>, Mortar<f64>, Tie<f64>));
     all.extend(by_trait!(dyn Obstacle<f64, 2>:
         Plane<f64, 2>, Sphere<f64, 2>, Cuboid<f64, 2>, Capsule<f64, 2>));
     all.extend(by_trait!(dyn Obstacle<f64, 3>:
         Plane<f64, 3>, Sphere<f64, 3>, Cuboid<f64, 3>, Capsule<f64, 3>, Cylinder<f64>, Cone<f64>));
-    #[cfg(feature = "search")]
+    #[cfg(feature = "mesh-contact")]
     all.extend(by_trait!(dyn Obstacle<f64, 2>: ClosedSurface<f64, 2>));
-    #[cfg(feature = "search")]
+    #[cfg(feature = "mesh-contact")]
     all.extend(by_trait!(dyn Obstacle<f64, 3>: ClosedSurface<f64, 3>));
     all.extend(by_trait!(dyn ContactSolver<f64>:
         ActiveSet<f64>, GaussSeidel<f64>, Pivoting<f64>, ProjectedGradient<f64>));

@@ -24,7 +24,8 @@ pub(crate) fn share_of_rounding<T: Float>() -> T {
 }
 
 /// √ε, half of the digits: values that agree to this share agree as far as solves with a matrix of unknown condition
-/// can tell.
+/// can tell. Distances below this share of the size of a facet have no direction; entries of a rotation differ by less
+/// from those of an orthonormal matrix.
 pub(crate) fn half_digits<T: Float>() -> T {
     T::epsilon().sqrt()
 }
@@ -84,6 +85,10 @@ pub(crate) fn smallest_gap<T: Float>() -> T {
 pub(crate) fn touching<T: Float>(way: T) -> T {
     number::<T>(1e-10) * way + rounding(way)
 }
+
+/// The covered share of a node's area below which the node has no row: weights divided by less would be rounding.
+#[cfg(feature = "mesh-contact")]
+pub(crate) const LEAST_COVER: f64 = 1e-6;
 
 // Stages.
 

@@ -1,7 +1,7 @@
 //! A step allocates nothing after the first, in contact or not. Alone in its binary: the counter is global.
 
 use contact_dynamics::contact::{
-    ClosedSurface, ContactLaw, NodeToFacet, Obstacle, Plane, RigidMotion, Side, Sphere, Surface,
+    ClosedSurface, ContactLaw, NodeToFacet, Obstacle, Plane, RigidMotion, Side, Sphere, Surface, SurfaceSettings,
 };
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
@@ -124,7 +124,7 @@ fn a_surface_against_itself() {
     let surface = Surface::of_cells(&stack.solid.nodes, &stack.solid.elements).unwrap();
     let contact = NodeToFacet::of_itself(&stack.solid.nodes, &stack.solid.node_dofs(), &surface).unwrap();
     // (Lists that are never built again.)
-    let contact = contact.skin(3.0).unwrap();
+    let contact = contact.with(SurfaceSettings::new().skin(3.0)).unwrap();
     let mut run = Simulation::builder(system, Composite, 2e-3).constraint(contact).build().unwrap();
     // (Until all nine rows have pressed at once.)
     for _ in 0..400 {

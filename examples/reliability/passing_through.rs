@@ -1,7 +1,7 @@
 //! Fast nodes at a ball and at a square of facets: how many runs end Ok and wrong.
 
 use super::{Anything, Row};
-use contact_dynamics::contact::{Facet, NodeToFacet, Side, Sphere};
+use contact_dynamics::contact::{Facet, NodeToFacet, Side, Sphere, SurfaceSettings};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
     ContactConstraint, Error, LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation, StepControl,
@@ -116,7 +116,7 @@ fn at_square(controlled: bool) -> Result<[usize; 3], Anything> {
         }
         let facets = (0..16).map(|k| Facet::from([1 + k, 1 + (k + 1) % 16]));
         let dofs: Vec<[usize; 2]> = (0..nodes.len()).map(|n| [2 * n, 2 * n + 1]).collect();
-        let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets)?.reach(reach)?;
+        let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets)?.with(SurfaceSettings::new().reach(reach))?;
         flight.run(contact, 2 * (nodes.len() - 1), controlled)
     }))
 }

@@ -1,5 +1,6 @@
 //! Surfaces that meet themselves, beside the same bodies with two surfaces.
 
+use contact_dynamics::contact::SurfaceSettings;
 use contact_dynamics::{Composite, EnergyMomentum, Result as Run};
 use contact_dynamics_scenes::folding::{FoldFigures, Folding};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -20,7 +21,12 @@ pub(crate) fn table(quick: bool) -> Result<String, Box<dyn Error>> {
     let closing = Folding::hairpin(0.1, 1.0);
     rows(&mut table, "hairpin that closes, linear", |own| {
         let contact = if own { closing.of_itself() } else { closing.of_two_surfaces() };
-        closing.run(closing.solid.system::<f64>(), contact?.reach(0.09)?, Composite, (2e-3, long(0.3)))
+        closing.run(
+            closing.solid.system::<f64>(),
+            contact?.with(SurfaceSettings::new().reach(0.09))?,
+            Composite,
+            (2e-3, long(0.3)),
+        )
     })?;
     let snap = Folding::hairpin(0.2, 3.0);
     rows(&mut table, "hairpin that snaps shut", |own| large(&snap, own, (5e-3, long(1.0))))?;

@@ -1,6 +1,6 @@
 //! Two rings of rubber that hit each other off center, at large strains: energy and momentum.
 
-use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet};
+use contact_dynamics::contact::{ContactConstraint, Facet, Mortar, NodeToFacet, SurfaceSettings};
 use contact_dynamics::{Composite, EnergyMomentum, PersistencyCorrection, Simulation, StepControl, TimeIntegrator};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -84,10 +84,15 @@ impl Rings {
             "one pass" => {
                 let slaves: Vec<usize> = second.iter().map(|facet| facet.nodes()[0]).collect();
                 let contact = NodeToFacet::one_pass(nodes, dofs, &slaves, first.clone())?;
-                Box::new(contact.facing(second.clone())?.reach(5.0)?)
+                Box::new(contact.facing(second.clone())?.with(SurfaceSettings::new().reach(5.0))?)
             }
-            "two passes" => Box::new(NodeToFacet::new(nodes, dofs, second.clone(), first.clone())?.reach(5.0)?),
-            _ => Box::new(Mortar::new(nodes, dofs, second.clone(), first.clone())?.reach(5.0)?),
+            "two passes" => Box::new(
+                NodeToFacet::new(nodes, dofs, second.clone(), first.clone())?
+                    .with(SurfaceSettings::new().reach(5.0))?,
+            ),
+            _ => Box::new(
+                Mortar::new(nodes, dofs, second.clone(), first.clone())?.with(SurfaceSettings::new().reach(5.0))?,
+            ),
         })
     }
 

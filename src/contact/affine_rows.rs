@@ -1,7 +1,36 @@
 //! Rows of G with the gaps at their point of linearization. Between two linearizations gaps are affine.
 
-use super::ContactJacobian;
+use super::surface::{Nodes, Point};
+use super::{Contact, ContactJacobian};
 use crate::real::Real;
+
+/// The state at a search: time, displacements, velocities, and the time that the search looks ahead.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SearchState<'a, T> {
+    pub(super) t: f64,
+    pub(super) u: &'a [T],
+    pub(super) v: &'a [T],
+    pub(super) ahead: f64,
+}
+
+/// Gives a contact Coulomb's friction with this coefficient. `shares` are its nodes and their shares in the slip.
+pub(super) fn set_friction<T: Real>(
+    contact: &mut Contact<'_, T>,
+    coefficient: f64,
+    (nodes, normal): (&Nodes, Point),
+    shares: impl Iterator<Item = (usize, f64)> + Clone,
+) {
+    if coefficient == 0.0 {
+        return;
+    }
+    contact.friction(coefficient);
+    for tangent in nodes.tangents(normal) {
+        contact.tangent_entries(shares.clone().flat_map(|(node, share)| {
+            let along = tangent.map(|along| T::of(share * along));
+            nodes.places(node).iter().copied().zip(along)
+        }));
+    }
+}
 
 /// Rows, gaps g* and displacements u* of the linearization: `g = g* + G (u − u*)`.
 #[derive(Debug)]

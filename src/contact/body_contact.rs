@@ -1,8 +1,7 @@
 //! Contact of two or more bodies with faces, corners and edges: the constraints that keep them apart.
 
-use super::edge_to_edge::{self, EdgeToEdge};
-use super::surface::{Facet, Nodes, Ramp, Surface, Thickness};
-use super::{ContactConstraint, ContactLaw, Mortar, NodeToFacet};
+use super::surface::{Facet, Nodes, Surface};
+use super::{ContactConstraint, EdgeToEdge, Mortar, NodeToFacet, SurfaceSettings, surface_settings};
 use crate::error::Result;
 use crate::real::Real;
 
@@ -73,15 +72,11 @@ pub struct BodyContact<T: Real, const D: usize> {
     /// Facets of the slave and of the master; for a surface against itself all facets, and none.
     facets: [Vec<Facet>; 2],
     sharp: [Vec<usize>; 2],
-    /// For a surface against itself, the number of rings of facets around a node that are excluded.
-    rings: Option<usize>,
-    offsets: Option<Vec<T>>,
-    ramp: Option<[[f64; 2]; 2]>,
-    angle: f64,
-    law: ContactLaw,
-    friction: f64,
-    reach: Option<T>,
+    is_of_itself: bool,
+    settings: SurfaceSettings<T>,
 }
+
+surface_settings!(BodyContact<T, D>);
 
 impl<T: Real, const D: usize> BodyContact<T, D> {
     /// Contact of the whole surfaces of two bodies, given by their facets. Choose the slave of the weighted gaps as
@@ -102,7 +97,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
         let facets = [slave.into_iter().map(Into::into).collect(), master.into_iter().map(Into::into).collect()];
-        Self::between(coordinates, dofs, facets, None)
+        Self::between(coordinates, dofs, facets, false)
     }
 
     /// Contact of a surface with itself, for a body that folds or for any number of bodies whose surfaces are given
@@ -137,99 +132,25 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         dofs: &[[usize; D]],
         facets: impl IntoIterator<Item = F>,
     ) -> Result<Self> {
-        Self::between(coordinates, dofs, [facets.into_iter().map(Into::into).collect(), Vec::new()], Some(1))
+        Self::between(coordinates, dofs, [facets.into_iter().map(Into::into).collect(), Vec::new()], true)
     }
 
     fn between(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
         facets: [Vec<Facet>; 2],
-        rings: Option<usize>,
+        is_of_itself: bool,
     ) -> Result<Self> {
         let mut contact = Self {
             coordinates: coordinates.to_vec(),
             dofs: dofs.to_vec(),
             facets,
             sharp: [Vec::new(), Vec::new()],
-            rings,
-            offsets: None,
-            ramp: None,
-            angle: edge_to_edge::SHARP,
-            law: ContactLaw::Rigid,
-            friction: 0.0,
-            reach: None,
+            is_of_itself,
+            settings: SurfaceSettings::new(),
         };
-        contact.find_sharp_nodes()?;
+        contact.apply_settings()?;
         Ok(contact)
-    }
-
-    /// Sets the number of rings of facets around a node or an edge that are excluded for [a surface against
-    /// itself](Self::of_itself); 1 by default ([`NodeToFacet::rings`]). Without effect for two surfaces.
-    #[must_use]
-    pub fn rings(mut self, rings: usize) -> Self {
-        self.rings = self.rings.map(|_| rings);
-        self
-    }
-
-    /// Sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh. Faces are
-    /// offset by this length ([`Mortar::offsets`], [`NodeToFacet::offsets`]); edges and corners are rounded with this
-    /// radius ([`EdgeToEdge::offsets`]).
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Dimension`](crate::Error::Dimension) unless there is one offset per node of the mesh;
-    /// [`constraints`](Self::constraints) reports the other errors.
-    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        Thickness::default().set(offsets, self.coordinates.len())?;
-        self.offsets = Some(offsets.to_vec());
-        Ok(self)
-    }
-
-    /// Scales all [`offsets`](Self::offsets) in time, as [`Mortar::ramp`].
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless all values are finite and the second time is later.
-    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        Ramp::new(times, factors)?;
-        self.ramp = Some([times, factors]);
-        Ok(self)
-    }
-
-    /// Sets the law of all rows.
-    #[must_use]
-    pub fn with_law(mut self, law: ContactLaw) -> Self {
-        self.law = law;
-        self
-    }
-
-    /// Sets Coulomb's friction with a coefficient μ ≥ 0 in all rows.
-    #[must_use]
-    pub fn friction(mut self, coefficient: f64) -> Self {
-        self.friction = coefficient;
-        self
-    }
-
-    /// Sets the least distance (length), outside and inside, at which facets and edges are found. The default is the
-    /// mean size of the facets: of the coarser surface for faces and edges, of the surface with the facets for corners.
-    /// The motion within a step is added by the velocities.
-    #[must_use]
-    pub fn reach(mut self, reach: T) -> Self {
-        self.reach = Some(reach);
-        self
-    }
-
-    /// Sets the angle (radians) from which convex sides, or nodes in two dimensions, are sharp: the angle between the
-    /// normals of their facets in the reference configuration; 30° by default.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless the angle is from 0 to π.
-    pub fn sharp(mut self, angle: f64) -> Result<Self> {
-        edge_to_edge::check_angle(angle)?;
-        self.angle = angle;
-        self.find_sharp_nodes()?;
-        Ok(self)
     }
 
     /// The nodes at sharp edges and corners of the slave, and of the master, ascending; for a surface against itself
@@ -238,17 +159,20 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         &self.sharp
     }
 
-    fn find_sharp_nodes(&mut self) -> Result<()> {
-        if self.rings.is_some() {
+    /// Checks the settings, and finds the sharp nodes.
+    fn apply_settings(&mut self) -> Result<()> {
+        self.settings.check(self.coordinates.len())?;
+        let angle = self.settings.edge_angle();
+        if self.is_of_itself {
             let nodes = Nodes::new(&self.coordinates, &self.dofs)?;
             let surface = Surface::of_facets(self.facets[0].iter().copied(), D, &nodes.coordinates)?;
-            let sharp = surface.sharp_nodes(self.angle, &nodes.coordinates);
+            let sharp = surface.sharp_nodes(angle, &nodes.coordinates);
             self.sharp = [sharp.clone(), sharp];
             return Ok(());
         }
         let [slave, master] = self.facets.each_ref().map(|facets| facets.iter().copied());
         let (nodes, surfaces) = Nodes::with_surfaces(&self.coordinates, &self.dofs, slave, master)?;
-        self.sharp = surfaces.map(|surface| surface.sharp_nodes(self.angle, &nodes.coordinates));
+        self.sharp = surfaces.map(|surface| surface.sharp_nodes(angle, &nodes.coordinates));
         Ok(())
     }
 
@@ -258,83 +182,32 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`](crate::Error::Parameter) unless the reach is positive and finite.
+    /// Those of the constructors of the constraints, which accept all that [`new`](Self::new) and
+    /// [`with`](Self::with) have accepted.
     pub fn constraints(self) -> Result<Vec<Box<dyn ContactConstraint<T>>>> {
-        let Self { coordinates, dofs, facets, sharp, rings, .. } = &self;
+        let Self { coordinates, dofs, facets, sharp, is_of_itself, settings } = self;
         let of = |body: usize| facets[body].iter().copied();
         let mut constraints: Vec<Box<dyn ContactConstraint<T>>> = Vec::new();
-        if let Some(rings) = *rings {
-            let nodes = NodeToFacet::of_itself(coordinates, dofs, of(0))?.rings(rings);
-            constraints.push(Box::new(self.given(nodes)?));
+        let given = || settings.clone();
+        if is_of_itself {
+            constraints.push(Box::new(NodeToFacet::of_itself(&coordinates, &dofs, of(0))?.with(given())?));
         } else {
-            let faces = Mortar::without_corner_check(coordinates, dofs, of(0), of(1))?;
-            constraints.push(Box::new(self.given(faces)?));
+            let faces = Mortar::without_corner_check(&coordinates, &dofs, of(0), of(1))?;
+            constraints.push(Box::new(faces.with(given())?));
             for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
-                let corners = NodeToFacet::one_pass(coordinates, dofs, nodes, of(1 - body))?.facing(of(body))?;
-                constraints.push(Box::new(self.given(corners)?));
+                let corners = NodeToFacet::one_pass(&coordinates, &dofs, nodes, of(1 - body))?.facing(of(body))?;
+                constraints.push(Box::new(corners.with(given())?));
             }
         }
         if D == 3 && sharp.iter().all(|nodes| !nodes.is_empty()) {
             let places: Vec<[T; 3]> = coordinates.iter().map(|x| std::array::from_fn(|i| x[i])).collect();
             let dofs: Vec<[usize; 3]> = dofs.iter().map(|dofs| std::array::from_fn(|i| dofs[i])).collect();
-            let edges = match *rings {
-                Some(rings) => EdgeToEdge::of_itself(&places, &dofs, of(0))?.rings(rings),
-                None => EdgeToEdge::new(&places, &dofs, of(0), of(1))?,
+            let edges = match is_of_itself {
+                true => EdgeToEdge::of_itself(&places, &dofs, of(0))?,
+                false => EdgeToEdge::new(&places, &dofs, of(0), of(1))?,
             };
-            constraints.push(Box::new(self.given(edges.sharp(self.angle)?)?));
+            constraints.push(Box::new(edges.with(given())?));
         }
         Ok(constraints)
     }
-
-    /// Applies the settings to one of the constraints.
-    fn given<C: Part<T>>(&self, part: C) -> Result<C> {
-        let mut part = part.with_law(self.law).friction(self.friction);
-        if let Some(reach) = self.reach {
-            part = part.reach(reach)?;
-        }
-        if let Some(offsets) = &self.offsets {
-            part = part.offsets(offsets)?;
-        }
-        match self.ramp {
-            Some([times, factors]) => part.ramp(times, factors),
-            None => Ok(part),
-        }
-    }
 }
-
-/// The settings that all constraints of the list have.
-trait Part<T: Real>: Sized {
-    fn with_law(self, law: ContactLaw) -> Self;
-    fn friction(self, coefficient: f64) -> Self;
-    fn reach(self, reach: T) -> Result<Self>;
-    fn offsets(self, offsets: &[T]) -> Result<Self>;
-    fn ramp(self, times: [f64; 2], factors: [f64; 2]) -> Result<Self>;
-}
-
-macro_rules! part {
-    ($($constraint:ident),*) => {$(
-        impl<T: Real> Part<T> for $constraint<T> {
-            fn with_law(self, law: ContactLaw) -> Self {
-                $constraint::with_law(self, law)
-            }
-
-            fn friction(self, coefficient: f64) -> Self {
-                $constraint::friction(self, coefficient)
-            }
-
-            fn reach(self, reach: T) -> Result<Self> {
-                $constraint::reach(self, reach)
-            }
-
-            fn offsets(self, offsets: &[T]) -> Result<Self> {
-                $constraint::offsets(self, offsets)
-            }
-
-            fn ramp(self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-                $constraint::ramp(self, times, factors)
-            }
-        }
-    )*};
-}
-
-part!(Mortar, NodeToFacet, EdgeToEdge);

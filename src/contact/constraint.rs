@@ -340,7 +340,13 @@ impl<'a, T> Stride<'a, T> {
     }
 
     /// The error of a contact (feature, candidate) of the constraint; `way` is its relative displacement in the step.
-    pub(crate) fn refuse(&self, (feature, candidate): (usize, usize), what: &'static str, way: f64, gap: f64) -> Error {
+    pub(crate) fn rejected(
+        &self,
+        (feature, candidate): (usize, usize),
+        what: &'static str,
+        way: f64,
+        gap: f64,
+    ) -> Error {
         let contact = ContactId { constraint: 0, feature, candidate };
         Error::PassedThrough { t: self.t[0], h: self.t[1] - self.t[0], contact, what, way, gap }
     }

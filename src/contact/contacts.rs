@@ -25,32 +25,27 @@ use std::ops::Range;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts<T> {
-    names: Vec<(usize, usize)>,
-    laws: Vec<ContactLaw>,
+    list: Vec<Data<T>>,
     rows: ContactJacobian<T>,
-    magnitudes: Vec<T>,
-    recoveries: Vec<T>,
     tangents: ContactJacobian<T>,
-    first_tangents: Vec<usize>,
-    frictions: Vec<f64>,
-    positions: Vec<Option<[T; 3]>>,
-    normals: Vec<Option<[T; 3]>>,
+}
+
+/// A candidate besides its rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Data<T> {
+    name: (usize, usize),
+    law: ContactLaw,
+    magnitude: T,
+    recovery: T,
+    first_tangent: usize,
+    friction: f64,
+    position: Option<[T; 3]>,
+    normal: Option<[T; 3]>,
 }
 
 impl<T> Default for Contacts<T> {
     fn default() -> Self {
-        Self {
-            names: Vec::new(),
-            laws: Vec::new(),
-            rows: ContactJacobian::default(),
-            magnitudes: Vec::new(),
-            recoveries: Vec::new(),
-            tangents: ContactJacobian::default(),
-            first_tangents: Vec::new(),
-            frictions: Vec::new(),
-            positions: Vec::new(),
-            normals: Vec::new(),
-        }
+        Self { list: Vec::new(), rows: ContactJacobian::default(), tangents: ContactJacobian::default() }
     }
 }
 
@@ -62,17 +57,9 @@ impl<T: Real> Contacts<T> {
 
     /// Removes all candidates and keeps the memory.
     pub fn clear(&mut self) {
-        let Self { names, laws, rows, magnitudes, recoveries, tangents, .. } = self;
-        names.clear();
-        laws.clear();
-        rows.clear();
-        magnitudes.clear();
-        recoveries.clear();
-        tangents.clear();
-        self.first_tangents.clear();
-        self.frictions.clear();
-        self.positions.clear();
-        self.normals.clear();
+        self.list.clear();
+        self.rows.clear();
+        self.tangents.clear();
     }
 
     /// Appends a candidate: its name (feature, candidate), which identifies it from step to step
@@ -95,35 +82,31 @@ impl<T: Real> Contacts<T> {
     }
 
     fn finish(&mut self, name: (usize, usize), law: ContactLaw) -> Contact<'_, T> {
-        self.names.push(name);
-        self.laws.push(law);
-        self.magnitudes.push(T::zero());
-        self.recoveries.push(T::infinity());
-        self.first_tangents.push(self.tangents.rows());
-        self.frictions.push(0.0);
-        self.positions.push(None);
-        self.normals.push(None);
-        Contact { contacts: self }
+        let (contact, first_tangent) = (self.list.len(), self.tangents.rows());
+        let (magnitude, recovery, friction) = (T::zero(), T::infinity(), 0.0);
+        let (position, normal) = (None, None);
+        self.list.push(Data { name, law, magnitude, recovery, first_tangent, friction, position, normal });
+        Contact { data: &mut self.list[contact], tangents: &mut self.tangents }
     }
 
     /// Number of candidates.
     pub fn len(&self) -> usize {
-        self.names.len()
+        self.list.len()
     }
 
     /// Whether there is no candidate.
     pub fn is_empty(&self) -> bool {
-        self.names.is_empty()
+        self.list.is_empty()
     }
 
     /// (feature, candidate) of a candidate.
     pub fn name(&self, contact: usize) -> (usize, usize) {
-        self.names[contact]
+        self.list[contact].name
     }
 
     /// The law of a candidate.
     pub fn law(&self, contact: usize) -> ContactLaw {
-        self.laws[contact]
+        self.list[contact].law
     }
 
     /// The (place, weight) pairs of the row of G of a candidate.
@@ -138,17 +121,18 @@ impl<T: Real> Contacts<T> {
 
     /// Whether names and rows are equal to another list.
     pub(crate) fn has_rows_of(&self, other: &Self) -> bool {
-        self.names == other.names && self.rows == other.rows
+        let names = self.list.iter().map(|data| data.name);
+        names.eq(other.list.iter().map(|data| data.name)) && self.rows == other.rows
     }
 
     /// The value set with [`Contact::magnitude`]; zero by default.
     pub fn magnitude(&self, contact: usize) -> T {
-        self.magnitudes[contact]
+        self.list[contact].magnitude
     }
 
     /// The value set with [`Contact::recovery`]; infinity by default.
     pub fn recovery(&self, contact: usize) -> T {
-        self.recoveries[contact]
+        self.list[contact].recovery
     }
 
     /// The rows of [`Contact::tangent`], as (place, weight) pairs.
@@ -158,7 +142,7 @@ impl<T: Real> Contacts<T> {
 
     /// The friction coefficient of a candidate; zero by default.
     pub fn friction(&self, contact: usize) -> f64 {
-        self.frictions[contact]
+        self.list[contact].friction
     }
 
     /// The tangents of all candidates, one after the other; their dofs are places.
@@ -168,32 +152,32 @@ impl<T: Real> Contacts<T> {
 
     /// The range of a candidate's tangents in [`tangent_rows`](Self::tangent_rows).
     pub(crate) fn tangents_of(&self, contact: usize) -> Range<usize> {
-        let end = self.first_tangents.get(contact + 1).copied().unwrap_or(self.tangents.rows());
-        self.first_tangents[contact]..end
+        let end = self.list.get(contact + 1).map_or(self.tangents.rows(), |next| next.first_tangent);
+        self.list[contact].first_tangent..end
     }
 
     pub(crate) fn has_friction(&self) -> bool {
-        self.frictions.iter().any(|&friction| friction != 0.0)
+        self.list.iter().any(|data| data.friction != 0.0)
     }
 
     /// The number of tangents of candidates with friction.
-    pub(crate) fn rubbing_rows(&self) -> usize {
-        let rubs = |contact: &usize| self.frictions[*contact] != 0.0;
-        (0..self.len()).filter(rubs).map(|contact| self.tangents_of(contact).len()).sum()
+    pub(crate) fn friction_rows(&self) -> usize {
+        let has_friction = |contact: &usize| self.friction(*contact) != 0.0;
+        (0..self.len()).filter(has_friction).map(|contact| self.tangents_of(contact).len()).sum()
     }
 
     /// The position of a contact, if its constraint has set it.
     pub fn position(&self, contact: usize) -> Option<[T; 3]> {
-        self.positions[contact]
+        self.list[contact].position
     }
 
     /// The normal of a contact in space, if its constraint has set it.
     pub fn normal(&self, contact: usize) -> Option<[T; 3]> {
-        self.normals[contact]
+        self.list[contact].normal
     }
 }
 
-/// The part of the penetration that exceeds the recovery of a step, see [`ContactLaw::kept_depth`].
+/// The part of the penetration that exceeds the recovery of a step: it stays, and gaps are measured from it.
 pub(crate) fn kept_depth<T: Real>(gap: T, recovery: T) -> T {
     (-gap - recovery).max(T::zero())
 }
@@ -201,7 +185,8 @@ pub(crate) fn kept_depth<T: Real>(gap: T, recovery: T) -> T {
 /// The candidate pushed last, for its optional data.
 #[derive(Debug)]
 pub struct Contact<'c, T> {
-    contacts: &'c mut Contacts<T>,
+    data: &'c mut Data<T>,
+    tangents: &'c mut ContactJacobian<T>,
 }
 
 impl<T: Real> Contact<'_, T> {
@@ -210,36 +195,31 @@ impl<T: Real> Contact<'_, T> {
     /// opens. There are two in space, along orthonormal directions, because the friction cone is round. Without
     /// [`friction`](Self::friction) they are kept for output.
     pub fn tangent(&mut self, row: &[(usize, T)]) -> &mut Self {
-        self.contacts.tangents.push(row);
+        self.tangent_entries(row.iter().copied());
         self
     }
 
     /// As [`tangent`](Self::tangent), with a row of a matrix.
     pub(crate) fn tangent_row(&mut self, (rows, row): (&ContactJacobian<T>, usize)) {
-        self.contacts.tangents.push_row(rows, row);
+        self.tangents.push_row(rows, row);
     }
 
     /// As [`tangent`](Self::tangent), with an iterator of pairs.
-    #[cfg(feature = "search")]
     pub(crate) fn tangent_entries(&mut self, entries: impl Iterator<Item = (usize, T)>) {
-        self.contacts.tangents.push_entries(entries);
+        self.tangents.push_entries(entries);
     }
 
     /// Sets Coulomb's friction along the [tangents](Self::tangent): the coefficient μ ≥ 0, zero by default. |f| ≤ μ p,
     /// and f opposes the slip. It may change with each search, for instance as a function of the position.
     pub fn friction(&mut self, coefficient: f64) -> &mut Self {
-        if let Some(friction) = self.contacts.frictions.last_mut() {
-            *friction = coefficient;
-        }
+        self.data.friction = coefficient;
         self
     }
 
     /// Sets the magnitude (length) of the terms of the gap besides G u and the gap itself, for instance coordinates.
     /// Contact treats gaps within the rounding of it as zero. The default is zero.
     pub fn magnitude(&mut self, size: T) -> &mut Self {
-        if let Some(magnitude) = self.contacts.magnitudes.last_mut() {
-            *magnitude = size;
-        }
+        self.data.magnitude = size;
         self
     }
 
@@ -262,25 +242,26 @@ impl<T: Real> Contact<'_, T> {
     /// assert_eq!([0, 1].map(|contact| contacts.recovery(contact)), [1e-4, f64::INFINITY]);
     /// ```
     pub fn recovery(&mut self, depth: T) -> &mut Self {
-        if let Some(last) = self.contacts.recoveries.last_mut() {
-            *last = depth;
-        }
+        self.data.recovery = depth;
         self
     }
 
     /// Sets the position of the contact, for output: x, y, z (length; zero for a missing axis).
     pub fn position(&mut self, position: [T; 3]) -> &mut Self {
-        if let Some(last) = self.contacts.positions.last_mut() {
-            *last = Some(position);
-        }
+        self.data.position = Some(position);
         self
+    }
+
+    /// Sets position and normal of a contact of meshes, and the magnitude of the position.
+    #[cfg(feature = "mesh-contact")]
+    pub(crate) fn at(&mut self, position: [f64; 3], normal: [f64; 3]) {
+        let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        self.magnitude(T::of(size)).position(position.map(T::of)).normal(normal.map(T::of));
     }
 
     /// Sets the direction in space in which the gap opens, for output: a unit vector.
     pub fn normal(&mut self, normal: [T; 3]) -> &mut Self {
-        if let Some(last) = self.contacts.normals.last_mut() {
-            *last = Some(normal);
-        }
+        self.data.normal = Some(normal);
         self
     }
 }

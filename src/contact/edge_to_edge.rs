@@ -6,31 +6,24 @@ mod pairs;
 mod passage;
 mod rows;
 
+use super::affine_rows::{SearchState, set_friction};
 use super::surface::{Facet, Material, Neighborhood, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
-use super::{Candidates, ContactConstraint, ContactLaw, Contacts, GapRates, Rates, Stride, check_local};
-use crate::error::{Error, Result};
+use super::{
+    Candidates, ContactConstraint, Contacts, GapRates, Rates, Stride, SurfaceSettings, check_local, surface_settings,
+};
+use crate::error::Result;
 use crate::real::Real;
 use edges::Edge;
 use lines::Crossing;
 use pairs::{LEAST_SINE, Pair};
 use rows::Rows;
 
-/// The default angle by which a surface turns around an edge: 30°.
-pub(super) const SHARP: f64 = std::f64::consts::FRAC_PI_6;
-
-/// Rejects a value that is not an angle by which a surface can turn.
-pub(super) fn check_angle(angle: f64) -> Result<()> {
-    match (0.0..=std::f64::consts::PI).contains(&angle) {
-        true => Ok(()),
-        false => Err(Error::Parameter { name: "the angle of a contact edge", value: angle, range: "from 0 to π" }),
-    }
-}
-
 /// Contact of the edges of two deforming surfaces in three dimensions, where they cross. It complements
 /// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not detect crossing edges, or is a part of a
 /// [`BodyContact`](super::BodyContact).
 ///
-/// Edges are the convex sides of facets around which a surface turns by more than an angle ([`sharp`](Self::sharp)).
+/// Edges are the convex sides of facets around which a surface turns by more than an angle
+/// ([`sharp`](SurfaceSettings::sharp)).
 /// The lines through an edge e of the first surface and an edge f of the second are closest at x_e and x_f. The pair
 /// is in contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is a
 /// normal of the second body at f, between the normals of the two facets beside f, and −n is a normal of the first
@@ -116,8 +109,7 @@ pub struct EdgeToEdge<T: Real> {
     acts: Vec<bool>,
     /// The length of the shortest edge, in the reference configuration.
     finest: f64,
-    law: ContactLaw,
-    friction: f64,
+    settings: SurfaceSettings<T>,
     /// Edges of the second surface near each edge of the first.
     neighborhood: Neighborhood,
     /// Positions at the start and at the end of a step, by node.
@@ -126,6 +118,8 @@ pub struct EdgeToEdge<T: Real> {
     /// Rows of the search in progress.
     found: Rows<T>,
 }
+
+surface_settings!(EdgeToEdge<T>);
 
 impl<T: Real> EdgeToEdge<T> {
     /// Contact of the edges of the facets `one` with the edges of the facets `other`.
@@ -149,9 +143,7 @@ impl<T: Real> EdgeToEdge<T> {
         other: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
         let (nodes, surfaces) = Nodes::with_surfaces(coordinates, dofs, one, other)?;
-        let mut contact = Self::between(nodes, surfaces);
-        contact.find_edges(SHARP)?;
-        Ok(contact)
+        Self::between(nodes, surfaces, false)
     }
 
     /// Contact of the edges of a surface with each other, for a body that folds or for several bodies whose surfaces
@@ -159,14 +151,14 @@ impl<T: Real> EdgeToEdge<T> {
     /// [`BodyContact::of_itself`](super::BodyContact::of_itself).
     ///
     /// Each pair of edges is listed once, with the smaller index first. Two edges are excluded if a node of one is
-    /// within one [ring](Self::rings) of a facet beside the other, and if one is behind a node of the other by more
-    /// than half of the material there, in the reference configuration.
+    /// within one [ring](SurfaceSettings::rings) of a facet beside the other, and if one is behind a node of the other
+    /// by more than half of the material there, in the reference configuration.
     ///
     /// ```
     /// use contact_dynamics::ContactConstraint;
     /// use contact_dynamics::contact::{Contacts, EdgeToEdge};
     ///
-    /// // The ridge of a tetrahedron across that of another, 0.1 above it; one list of facets.
+    /// // The ridges of two tetrahedra cross, 0.1 apart; one list of facets.
     /// let coordinates = [
     ///     [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 1.0, -1.0],
     ///     [0.0, -1.0, 0.1], [0.0, 1.0, 0.1], [-1.0, 0.0, 1.1], [1.0, 0.0, 1.1],
@@ -195,133 +187,36 @@ impl<T: Real> EdgeToEdge<T> {
     ) -> Result<Self> {
         let nodes = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, 3, &nodes.coordinates)?;
-        let mut contact = Self::between(nodes, [surface.clone(), surface]);
-        contact.vicinity = Vicinity::of_itself(contact.surfaces[0].typical());
-        contact.find_edges(SHARP)?;
-        Ok(contact)
+        Self::between(nodes, [surface.clone(), surface], true)
     }
 
-    /// From two surfaces; the edges are found later.
-    fn between(nodes: Nodes, surfaces: [Surface; 2]) -> Self {
-        Self {
+    /// From two surfaces, or from the same surface twice.
+    fn between(nodes: Nodes, surfaces: [Surface; 2], of_itself: bool) -> Result<Self> {
+        let settings = SurfaceSettings::new();
+        let typical = surfaces[0].typical().max(surfaces[1].typical());
+        let mut contact = Self {
             ends: [nodes.coordinates.clone(), nodes.coordinates.clone()],
+            vicinity: Vicinity::new(&settings, nodes.coordinates.len(), typical, of_itself)?,
             nodes,
-            vicinity: Vicinity::new(surfaces[0].typical().max(surfaces[1].typical())),
             surfaces,
             edges: [Vec::new(), Vec::new()],
             ends_of: [Vec::new(), Vec::new()],
             acts: Vec::new(),
             finest: f64::INFINITY,
-            law: ContactLaw::Rigid,
-            friction: 0.0,
+            settings,
             neighborhood: Neighborhood::default(),
             rows: Rows::new(),
             found: Rows::new(),
-        }
+        };
+        contact.find_edges()?;
+        Ok(contact)
     }
 
-    /// For [a surface against itself](Self::of_itself), sets the number of rings of facets around the nodes of an
-    /// edge whose edges are excluded, as [`NodeToFacet::rings`](super::NodeToFacet::rings). The default is 1.
-    #[must_use]
-    pub fn rings(mut self, rings: usize) -> Self {
-        self.vicinity.set_rings(rings);
-        self
-    }
-
-    /// Rounds the edges: sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the
-    /// mesh, as [`NodeToFacet::offsets`](super::NodeToFacet::offsets). The gap is the gap of the lines less the radii
-    /// of both edges at the closest points, which are linear between nodes. With negative offsets (a surface inside
-    /// of its facets) edges are in contact slightly early, by up to 0.4 of the offset at right angles, because
-    /// between its faces the body is smaller by more than the offset.
-    ///
-    /// ```
-    /// use contact_dynamics::ContactConstraint;
-    /// use contact_dynamics::contact::EdgeToEdge;
-    ///
-    /// // Two ridges that cross, 0.1 apart, of which each is coated by 0.02.
-    /// let coordinates = [
-    ///     [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0], [0.0, 1.0, -1.0],
-    ///     [0.0, -1.0, 0.1], [0.0, 1.0, 0.1], [-1.0, 0.0, 1.1], [1.0, 0.0, 1.1],
-    /// ];
-    /// let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
-    /// let (below, above) = ([[0, 1, 3], [1, 0, 2]], [[4, 5, 7], [5, 4, 6]]);
-    /// let mut contact = EdgeToEdge::new(&coordinates, &dofs, above, below)?.offsets(&[0.02; 8])?;
-    /// contact.search(0.0, &[0.0; 24], &[0.0; 24], 0.0)?;
-    /// let mut gap = [0.0];
-    /// contact.gaps(0.0, &[0.0; 24], &mut gap)?;
-    /// assert!((gap[0] - 0.06_f64).abs() < 1e-15);
-    /// # Ok::<(), contact_dynamics::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Dimension`] unless there is one offset per node of the mesh; [`Error::NotFinite`] (index: node).
-    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.vicinity.set_offsets(offsets, self.nodes.coordinates.len())?;
-        Ok(self)
-    }
-
-    /// Scales all [`offsets`](Self::offsets) in time, as [`Mortar::ramp`](super::Mortar::ramp).
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless all values are finite and the second time is later.
-    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.vicinity.set_ramp(times, factors)?;
-        Ok(self)
-    }
-
-    /// Sets the law of all rows.
-    #[must_use]
-    pub fn with_law(mut self, law: ContactLaw) -> Self {
-        self.law = law;
-        self
-    }
-
-    /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the velocity of the closest material point of the
-    /// first edge relative to the one of the second edge.
-    #[must_use]
-    pub fn friction(mut self, coefficient: f64) -> Self {
-        self.friction = coefficient;
-        self
-    }
-
-    /// Sets the least distance (length), outside and inside, at which edges are found; by default the mean size of
-    /// the facets, of the coarser surface. The motion within a step is added by the velocities.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.vicinity.set_least(reach)?;
-        Ok(self)
-    }
-
-    /// Sets how far (length) the surfaces may move relative to each other before lists of near edges are rebuilt; the
-    /// default is half of the search range. It changes the cost, not the result.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.vicinity.reach.set_skin(skin)?;
-        Ok(self)
-    }
-
-    /// Sets the angle (radians) from which a convex side is an edge: the angle between the normals of its facets in
-    /// the reference configuration; 30° by default.
-    ///
-    /// Sides with smaller angles are left to nodes on facets. Two edges of length l that cross at their middles then
-    /// penetrate by at most ½ l tan(½ `angle`) before a node touches: by 13 % of an element at 30°. With a smaller
-    /// angle the sides of a mesh on a curved surface become edges, and all of them are searched.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless the angle is from 0 to π.
-    pub fn sharp(mut self, angle: f64) -> Result<Self> {
-        check_angle(angle)?;
-        self.find_edges(angle)?;
-        Ok(self)
+    fn apply_settings(&mut self) -> Result<()> {
+        let typical = self.surfaces[0].typical().max(self.surfaces[1].typical());
+        let (nodes, of_itself) = (self.nodes.coordinates.len(), self.vicinity.is_of_itself());
+        self.vicinity = Vicinity::new(&self.settings, nodes, typical, of_itself)?;
+        self.find_edges()
     }
 
     /// The nodes of the edges of both surfaces, the smaller node of each edge first, in ascending order: features are
@@ -330,8 +225,10 @@ impl<T: Real> EdgeToEdge<T> {
         self.ends_of.each_ref().map(Vec::as_slice)
     }
 
-    fn find_edges(&mut self, angle: f64) -> Result<()> {
-        let Self { nodes, surfaces, edges, .. } = self;
+    /// Finds the edges, and the dofs on which they act.
+    fn find_edges(&mut self) -> Result<()> {
+        let Self { nodes, surfaces, edges, settings, .. } = self;
+        let angle = settings.edge_angle();
         for (edges, surface) in edges.iter_mut().zip(&*surfaces) {
             *edges = Edge::of(surface, angle, &nodes.coordinates);
         }
@@ -352,7 +249,6 @@ impl<T: Real> EdgeToEdge<T> {
         for &[from, to] in self.ends_of.iter().flatten() {
             nodes.places(from).iter().chain(nodes.places(to)).for_each(|&place| self.acts[place] = true);
         }
-        self.vicinity.forget();
         self.rows.clear();
         Ok(())
     }
@@ -371,7 +267,7 @@ impl<T: Real> EdgeToEdge<T> {
         self.neighborhood.build(one, other, listed);
     }
 
-    fn find_rows(&mut self, (t, u, v): (f64, &[T], &[T]), ahead: f64) {
+    fn find_rows(&mut self, &SearchState { t, u, v, ahead }: &SearchState<'_, T>) {
         let Self { nodes, edges, surfaces, vicinity, neighborhood, found, .. } = self;
         let Vicinity { thickness, reach, .. } = &*vicinity;
         let sides = Sides { edges, surfaces, vicinity, offsets: thickness.at(t) };
@@ -455,21 +351,13 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             let pair = sides.pair(index);
             let [ends, _] = pair.ends(&|node| self.nodes.positions[node]);
             let position = Edge::point(ends, crossing.shares[0].clamp(0.0, 1.0));
-            let size = position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            let mut contact = contacts.push_row((index[0], index[1]), self.law, (&affine.jacobian, row));
-            contact.magnitude(T::of(size)).position(position.map(T::of)).normal(crossing.normal.map(T::of));
+            let mut contact =
+                contacts.push_row((index[0], index[1]), self.settings.given_law(), (&affine.jacobian, row));
+            contact.at(position, crossing.normal);
             contact.recovery(T::of(pair.recovery()));
-            if self.friction == 0.0 {
-                continue;
-            }
-            contact.friction(self.friction);
-            for tangent in self.nodes.tangents(crossing.normal) {
-                let entries = pair.nodes().into_iter().zip(crossing.weights()).flat_map(|(node, share)| {
-                    let places = self.nodes.places(node);
-                    places.iter().zip(tangent).map(move |(&place, along)| (place, T::of(share * along)))
-                });
-                contact.tangent_entries(entries);
-            }
+            let (coefficient, shares) =
+                (self.settings.given_friction(), pair.nodes().into_iter().zip(crossing.weights()));
+            set_friction(&mut contact, coefficient, (&self.nodes, crossing.normal), shares);
         }
     }
 
@@ -485,7 +373,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             let range = self.vicinity.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
                 self.update_lists(range);
-                self.find_rows((t, u, v), ahead);
+                self.find_rows(&SearchState { t, u, v, ahead });
             }
         }
         let (rows, found) = (&self.rows, &self.found);
@@ -551,6 +439,6 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        self.look_at(step)
+        self.check_step(step)
     }
 }

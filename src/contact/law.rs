@@ -1,6 +1,5 @@
 //! Contact laws: the relation between force and gap of one row.
 
-use super::contacts::kept_depth;
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
@@ -274,13 +273,7 @@ impl ContactLaw {
             Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
                 false
             }
-            Self::Penalty { .. }
-            | Self::PowerLaw { .. }
-            | Self::KelvinVoigt { .. }
-            | Self::HuntCrossley { .. }
-            | Self::Bipenalty { .. }
-            | Self::StabilizedBipenalty { .. }
-            | Self::AugmentedLagrangian { .. } => true,
+            _ => true,
         }
     }
 
@@ -341,11 +334,6 @@ impl ContactLaw {
         self.is_compliant() || self.reads_start()
     }
 
-    /// Whether a closed row causes jumps of velocity and acceleration that correctors remove.
-    pub(crate) fn leaves_jumps(&self) -> bool {
-        !self.is_compliant()
-    }
-
     /// Whether the row constrains only the gap, or its rate where the scheme does. Predicted displacements are
     /// projected onto such rows.
     pub(crate) fn is_plain(&self) -> bool {
@@ -356,18 +344,12 @@ impl ContactLaw {
     /// pull, or does not belong to a single instant.
     pub(crate) fn admits_friction(&self) -> bool {
         match self {
-            Self::Rigid
-            | Self::Restitution { .. }
-            | Self::Penalty { .. }
-            | Self::PowerLaw { .. }
-            | Self::KelvinVoigt { .. }
-            | Self::HuntCrossley { .. }
-            | Self::AugmentedLagrangian { .. } => true,
             Self::Equality
             | Self::RateCondition
             | Self::PersistencySwitch
             | Self::Bipenalty { .. }
             | Self::StabilizedBipenalty { .. } => false,
+            _ => true,
         }
     }
 
@@ -377,15 +359,10 @@ impl ContactLaw {
         matches!(self, Self::StabilizedBipenalty { .. })
     }
 
-    /// Whether the law would recover a penetration at once, so that its recovery is limited per step.
-    pub(crate) fn keeps_depths(&self) -> bool {
-        *self == Self::Rigid
-    }
-
-    /// The part of a penetration that stays in this step, if at most `recovery` of it is recovered. Gaps are measured
-    /// from it.
-    pub(crate) fn kept_depth<T: Real>(&self, gap: T, recovery: T) -> T {
-        if self.keeps_depths() { kept_depth(gap, recovery) } else { T::zero() }
+    /// The penetration that a row may recover in a step, if its constraint limits it to `depth`. Only a rigid row
+    /// would recover all of it at once; for other laws there is no limit.
+    pub(crate) fn recovery<T: Real>(&self, depth: T) -> T {
+        if *self == Self::Rigid { depth } else { T::infinity() }
     }
 
     pub(crate) fn is_equality(&self) -> bool {
@@ -398,35 +375,46 @@ impl ContactLaw {
         matches!(self, Self::RateCondition | Self::PersistencySwitch)
     }
 
-    /// Rejects parameters out of range.
-    pub(crate) fn check(&self) -> Result<()> {
-        let inside = |name, value: f64, ok: bool, range| match ok {
+    /// Rejects parameters out of range. Also rejects a parameter if it or its reciprocal becomes zero or infinite in
+    /// the scalar of a run.
+    pub(crate) fn check<T: Real>(&self) -> Result<()> {
+        let within = |name, value: f64, ok: bool, range| match ok {
             true => Ok(()),
             false => Err(Error::Parameter { name, value, range }),
         };
-        let stiff = |stiffness| positive("the contact stiffness", stiffness).map(|_| ());
+        let fits = |name, value: f64| {
+            let own = T::of(value);
+            let ok = own.is_finite() && own.recip().is_finite();
+            within(
+                name,
+                value,
+                ok,
+                "a number of the scalar of the run, and its reciprocal too: choose other units, or f64",
+            )
+        };
+        let stiff = |stiffness| fits("the contact stiffness", positive("the contact stiffness", stiffness)?);
         let power = |stiffness, exponent: f64| {
             stiff(stiffness)?;
             let ok = exponent >= 1.0 && exponent.is_finite();
-            inside("the exponent of the contact law", exponent, ok, "at least 1 and finite")
+            within("the exponent of the contact law", exponent, ok, "at least 1 and finite")?;
+            fits("the contact stiffness times the exponent", stiffness * exponent)
         };
-        let damps =
-            |name, value: f64| inside(name, value, value >= 0.0 && value.is_finite(), "not negative and finite");
+        // Zero is in range.
+        let damps = |name, value: f64| {
+            within(name, value, value >= 0.0 && value.is_finite(), "not negative and finite")?;
+            if value > 0.0 { fits(name, value) } else { Ok(()) }
+        };
         match *self {
             Self::Rigid | Self::Equality | Self::RateCondition | Self::PersistencySwitch => Ok(()),
             Self::Restitution { coefficient: e } => {
-                inside("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
+                within("the coefficient of restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")
             }
             Self::Penalty { stiffness } | Self::StabilizedBipenalty { stiffness } => stiff(stiffness),
             Self::AugmentedLagrangian { stiffness, augmentations } => {
                 stiff(stiffness)?;
-                let (name, value) = ("the number of augmentations", augmentations as f64);
-                inside(
-                    name,
-                    value,
-                    augmentations <= 10_000,
-                    "at most 10000: each of them solves the contact problem again",
-                )
+                let (name, range) =
+                    ("the number of augmentations", "at most 10000: each of them solves the contact problem again");
+                within(name, augmentations as f64, augmentations <= 10_000, range)
             }
             Self::PowerLaw { stiffness, exponent } => power(stiffness, exponent),
             Self::KelvinVoigt { stiffness, damping } => {
@@ -439,50 +427,8 @@ impl ContactLaw {
             }
             Self::Bipenalty { stiffness, mass } => {
                 stiff(stiffness)?;
-                inside("the contact mass", mass, mass >= 0.0 && mass.is_finite(), "not negative and finite")
-            }
-        }
-    }
-
-    /// Rejects parameters that become zero or infinite in the scalar of a run, or whose reciprocals do.
-    pub(crate) fn check_scalar<T: Real>(&self) -> Result<()> {
-        let fits = |name, value: f64| {
-            let own = T::of(value);
-            match own.is_finite() && own.recip().is_finite() {
-                true => Ok(()),
-                false => Err(Error::Parameter {
-                    name,
-                    value,
-                    range: "a number of the scalar of the run, and its reciprocal too: choose other units, or f64",
-                }),
-            }
-        };
-        match *self {
-            Self::Rigid | Self::Equality | Self::RateCondition | Self::PersistencySwitch | Self::Restitution { .. } => {
-                Ok(())
-            }
-            Self::Penalty { stiffness }
-            | Self::StabilizedBipenalty { stiffness }
-            | Self::AugmentedLagrangian { stiffness, .. } => fits("the contact stiffness", stiffness),
-            Self::PowerLaw { stiffness, exponent } => {
-                fits("the contact stiffness", stiffness)?;
-                fits("the exponent of the contact law", exponent)?;
-                fits("the contact stiffness times the exponent", stiffness * exponent)
-            }
-            Self::KelvinVoigt { stiffness, damping } => {
-                fits("the contact stiffness", stiffness)?;
-                if damping > 0.0 { fits("the contact damping", damping) } else { Ok(()) }
-            }
-            Self::HuntCrossley { stiffness, exponent, dissipation } => {
-                Self::PowerLaw { stiffness, exponent }.check_scalar::<T>()?;
-                if dissipation > 0.0 { fits("the dissipation of the contact law", dissipation) } else { Ok(()) }
-            }
-            Self::Bipenalty { stiffness, mass } => {
-                fits("the contact stiffness", stiffness)?;
-                match mass > 0.0 {
-                    true => fits("the contact mass over the contact stiffness", self.inertia()),
-                    false => Ok(()),
-                }
+                within("the contact mass", mass, mass >= 0.0 && mass.is_finite(), "not negative and finite")?;
+                damps("the contact mass over the contact stiffness", self.inertia())
             }
         }
     }
@@ -506,9 +452,7 @@ impl ContactLaw {
             Self::PowerLaw { stiffness, exponent } => T::of(stiffness) * depth.powf(T::of(exponent)),
             Self::KelvinVoigt { .. } | Self::HuntCrossley { .. } if depth == T::zero() => T::zero(),
             Self::KelvinVoigt { .. } | Self::HuntCrossley { .. } => self.pull(depth, approach).max(T::zero()),
-            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
-                T::zero()
-            }
+            _ => T::zero(),
         }
     }
 
@@ -538,12 +482,7 @@ impl ContactLaw {
             Self::HuntCrossley { stiffness, exponent, dissipation } if depth > 0.0 => {
                 [exponent * force / depth, dissipation * stiffness * depth.powf(exponent)]
             }
-            Self::HuntCrossley { .. }
-            | Self::Rigid
-            | Self::Equality
-            | Self::Restitution { .. }
-            | Self::RateCondition
-            | Self::PersistencySwitch => [0.0; 2],
+            _ => [0.0; 2],
         }
     }
 
@@ -647,7 +586,7 @@ mod tests {
             ContactLaw::AugmentedLagrangian { stiffness: -1.0, augmentations: 3 },
             ContactLaw::AugmentedLagrangian { stiffness: 1.0, augmentations: usize::MAX },
         ] {
-            assert!(law.check().is_err(), "{law:?}");
+            assert!(law.check::<f64>().is_err(), "{law:?}");
         }
     }
 }

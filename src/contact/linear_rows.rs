@@ -14,29 +14,38 @@ type Drag<'a, T> = Box<dyn FnMut(f64) -> [[T; 2]; 2] + Send + 'a>;
 /// The (dof, weight) pairs of a row without other data, and its law.
 pub(crate) type PlainRow<T> = (Vec<(usize, T)>, ContactLaw);
 
+/// A row besides its weights.
+struct Row<'a, T> {
+    law: ContactLaw,
+    offset: GapOffset<'a, T>,
+    bond: Option<Bond>,
+    friction: Option<Friction<'a, T>>,
+}
+
 struct Friction<'a, T> {
-    row: usize,
     coefficient: f64,
     /// Rows of `LinearRows::tangents`.
     tangents: Range<usize>,
     drag: Option<Drag<'a, T>>,
 }
 
-impl<T> std::fmt::Debug for Friction<'_, T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Friction")
-            .field("row", &self.row)
-            .field("coefficient", &self.coefficient)
-            .finish_non_exhaustive()
+/// A bonded row holds in both directions until its tension exceeds its strength.
+struct Bond {
+    strength: f64,
+    is_broken: bool,
+}
+
+impl<T> Row<'_, T> {
+    /// Whether a bond of the row holds.
+    fn is_bonded(&self) -> bool {
+        self.bond.as_ref().is_some_and(|bond| !bond.is_broken)
     }
 }
 
-/// A row that holds in both directions until its tension exceeds its strength.
-#[derive(Debug)]
-struct Bond {
-    row: usize,
-    strength: f64,
-    is_broken: bool,
+impl<T: Real> std::fmt::Debug for Row<'_, T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Row").field("law", &self.law).field("offset", &self.offset).finish_non_exhaustive()
+    }
 }
 
 /// The part g0 of a gap that does not depend on u: constant, or a function of time with its first two derivatives.
@@ -90,13 +99,9 @@ pub struct LinearRows<'a, T: Real> {
     dofs: DofList,
     /// Dofs are places in the list.
     jacobian: ContactJacobian<T>,
-    laws: Vec<ContactLaw>,
-    offsets: Vec<GapOffset<'a, T>>,
-    /// Rows that hold in both directions until their tension exceeds their strength, in their order.
-    bonds: Vec<Bond>,
+    rows: Vec<Row<'a, T>>,
     /// Dofs are places in the list.
     tangents: ContactJacobian<T>,
-    frictions: Vec<Friction<'a, T>>,
     coordinates: T,
     /// Whether the given numbers have been checked.
     checked: bool,
@@ -111,10 +116,8 @@ impl<T: Real> Default for LinearRows<'_, T> {
 impl<'a, T: Real> LinearRows<'a, T> {
     /// A constraint without rows.
     pub fn new() -> Self {
-        let (dofs, jacobian) = (DofList::default(), ContactJacobian::default());
-        let (tangents, frictions) = (ContactJacobian::default(), Vec::new());
-        let (laws, offsets, bonds, coordinates) = (Vec::new(), Vec::new(), Vec::new(), T::zero());
-        Self { dofs, jacobian, laws, offsets, bonds, tangents, frictions, coordinates, checked: false }
+        let (jacobian, tangents) = (ContactJacobian::default(), ContactJacobian::default());
+        Self { dofs: DofList::default(), jacobian, rows: Vec::new(), tangents, coordinates: T::zero(), checked: false }
     }
 
     /// One unilateral row for each row of `g`, with the initial gaps `gaps`.
@@ -165,9 +168,10 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn bond(mut self, strength: f64, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
-        self.bonds.push(Bond { row: self.laws.len(), strength, is_broken: false });
-        self.row(ContactLaw::Equality, entries, offset)
+    pub fn bond(self, strength: f64, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
+        let mut rows = self.row(ContactLaw::Equality, entries, offset);
+        rows.rows.last_mut().into_iter().for_each(|row| row.bond = Some(Bond { strength, is_broken: false }));
+        rows
     }
 
     /// Adds the contact of a pair of nodes along a fixed normal, from the first to the second: g = n · (u_b − u_a) +
@@ -224,8 +228,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
     pub fn row(mut self, law: ContactLaw, entries: &[(usize, T)], offset: impl Into<GapOffset<'a, T>>) -> Self {
         let entries = entries.iter().map(|&(dof, weight)| (self.dofs.place(dof), weight));
         self.jacobian.push_entries(entries);
-        self.laws.push(law);
-        self.offsets.push(offset.into());
+        self.rows.push(Row { law, offset: offset.into(), bond: None, friction: None });
         self.checked = false;
         self
     }
@@ -256,15 +259,13 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// ```
     #[must_use]
     pub fn friction(mut self, coefficient: f64, tangents: &[&[(usize, T)]]) -> Self {
-        let Some(row) = self.laws.len().checked_sub(1) else { return self };
-        // Only the last entry can belong to the last row.
-        self.frictions.pop_if(|friction| friction.row == row);
+        let Some(row) = self.rows.last_mut() else { return self };
         let first = self.tangents.rows();
         for entries in tangents {
             let entries = entries.iter().map(|&(dof, weight)| (self.dofs.place(dof), weight));
             self.tangents.push_entries(entries);
         }
-        self.frictions.push(Friction { row, coefficient, tangents: first..self.tangents.rows(), drag: None });
+        row.friction = Some(Friction { coefficient, tangents: first..self.tangents.rows(), drag: None });
         self.checked = false;
         self
     }
@@ -273,8 +274,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// them at t, and its accelerations. Without [`friction`](Self::friction) of that row it does nothing.
     #[must_use]
     pub fn dragging(mut self, drag: impl FnMut(f64) -> [[T; 2]; 2] + Send + 'a) -> Self {
-        let row = self.laws.len().wrapping_sub(1);
-        if let Some(friction) = self.frictions.last_mut().filter(|friction| friction.row == row) {
+        if let Some(friction) = self.rows.last_mut().and_then(|row| row.friction.as_mut()) {
             friction.drag = Some(Box::new(drag));
         }
         self
@@ -290,7 +290,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
 
     /// Rejects numbers out of range.
     fn check(&self) -> Result<()> {
-        for bond in &self.bonds {
+        for bond in self.rows.iter().filter_map(|row| row.bond.as_ref()) {
             positive("the strength of a bond", bond.strength)?;
         }
         let weights = &self.jacobian.weights;
@@ -298,8 +298,8 @@ impl<'a, T: Real> LinearRows<'a, T> {
             let value = weights[index].value();
             return Err(Error::NotFinite { what: "the weights of the contact rows", index, value });
         }
-        for (index, offset) in self.offsets.iter().enumerate() {
-            match offset {
+        for (index, row) in self.rows.iter().enumerate() {
+            match row.offset {
                 GapOffset::Constant(gap) if !gap.is_finite() => {
                     return Err(Error::NotFinite { what: "the gaps of the contact rows", index, value: gap.value() });
                 }
@@ -313,29 +313,28 @@ impl<'a, T: Real> LinearRows<'a, T> {
     pub(crate) fn plain(&self) -> Result<Vec<PlainRow<T>>> {
         self.check()?;
         let refused = |reason| Err(Error::Incompatible { part: "the contact rows".into(), reason });
-        if !self.frictions.is_empty() {
+        if self.rows.iter().any(|row| row.friction.is_some()) {
             return refused("exact propagation knows no friction; take a scheme");
         }
-        if !self.bonds.is_empty() {
+        if self.rows.iter().any(|row| row.bond.is_some()) {
             return refused("exact propagation knows no bonds; take a scheme");
         }
-        let plain = |law: &ContactLaw| matches!(law, ContactLaw::Rigid | ContactLaw::Equality);
-        if !self.laws.iter().all(plain) {
+        if !self.rows.iter().all(|row| row.law.is_plain()) {
             return refused("exact propagation knows rigid and equality rows; take a scheme for other laws");
         }
         let dofs = self.dofs.as_slice();
         let entries = |row| self.jacobian.row(row).map(|(place, weight)| (dofs[place], weight)).collect();
-        Ok(self.laws.iter().enumerate().map(|(row, &law)| (entries(row), law)).collect())
+        Ok(self.rows.iter().enumerate().map(|(index, row)| (entries(index), row.law)).collect())
     }
 
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.laws.len()
+        self.rows.len()
     }
 
     /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
-        self.laws.is_empty()
+        self.rows.is_empty()
     }
 }
 
@@ -351,15 +350,12 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let mut frictions = self.frictions.iter().peekable();
-        let mut bonds = self.bonds.iter().peekable();
-        for (row, &law) in self.laws.iter().enumerate() {
-            let bond = bonds.next_if(|bond| bond.row == row);
-            let law = if bond.is_some_and(|bond| bond.is_broken) { ContactLaw::Rigid } else { law };
-            let mut contact = contacts.push_row((row, 0), law, (&self.jacobian, row));
+        for (index, row) in self.rows.iter().enumerate() {
+            let is_broken = row.bond.is_some() && !row.is_bonded();
+            let law = if is_broken { ContactLaw::Rigid } else { row.law };
+            let mut contact = contacts.push_row((index, 0), law, (&self.jacobian, index));
             contact.magnitude(self.coordinates);
-            let friction = frictions.next_if(|friction| friction.row == row);
-            if let Some(friction) = friction.filter(|_| bond.is_none_or(|bond| bond.is_broken)) {
+            if let Some(friction) = row.friction.as_ref().filter(|_| !row.is_bonded()) {
                 contact.friction(friction.coefficient);
                 for tangent in friction.tangents.clone() {
                     contact.tangent_row((&self.tangents, tangent));
@@ -376,22 +372,22 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        for (row, (offset, gap)) in self.offsets.iter_mut().zip(gaps).enumerate() {
-            let g0 = match offset {
+        for (index, (row, gap)) in self.rows.iter_mut().zip(gaps).enumerate() {
+            let g0 = match &mut row.offset {
                 GapOffset::Constant(g0) => *g0,
                 GapOffset::Moving(f) => f(t)[0],
             };
-            *gap = self.jacobian.product(row, u) + g0;
+            *gap = self.jacobian.product(index, u) + g0;
         }
         Ok(())
     }
 
     fn rates(&mut self, t: f64, _u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        if self.offsets.iter().all(|offset| matches!(offset, GapOffset::Constant(_))) {
+        if self.rows.iter().all(|row| matches!(row.offset, GapOffset::Constant(_))) {
             return Ok(Rates::Zero);
         }
-        for (offset, rates) in self.offsets.iter_mut().zip(rates) {
-            *rates = match offset {
+        for (row, rates) in self.rows.iter_mut().zip(rates) {
+            *rates = match &mut row.offset {
                 GapOffset::Constant(_) => GapRates::default(),
                 GapOffset::Moving(f) => {
                     let [_, rate, acceleration] = f(t);
@@ -403,13 +399,12 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn slip_rates(&mut self, t: f64, _u: &[T], _v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        if self.frictions.iter().all(|friction| friction.drag.is_none()) {
+        let drags = |row: &Row<'_, T>| row.friction.as_ref().is_some_and(|friction| friction.drag.is_some());
+        if !self.rows.iter().any(drags) {
             return Ok(Rates::Zero);
         }
         let mut rates = rates.iter_mut();
-        let Self { frictions, bonds, .. } = self;
-        let holds = |row: usize| bonds.iter().any(|bond| bond.row == row && !bond.is_broken);
-        for friction in frictions.iter_mut().filter(|friction| !holds(friction.row)) {
+        for friction in self.rows.iter_mut().filter(|row| !row.is_bonded()).filter_map(|row| row.friction.as_mut()) {
             let drag = friction.drag.as_mut().map_or([[T::zero(); 2]; 2], |drag| drag(t));
             for (rates, dragged) in rates.by_ref().take(friction.tangents.len()).zip(GapRates::dragged(drag)) {
                 *rates = dragged;
@@ -424,22 +419,23 @@ impl<T: Real> ContactConstraint<T> for LinearRows<'_, T> {
     }
 
     fn overloads(&self, forces: &[T], broken: &mut Vec<(usize, f64)>) {
-        for bond in self.bonds.iter().filter(|bond| !bond.is_broken) {
-            let load = -forces[bond.row].value() / bond.strength;
+        for (index, (row, force)) in self.rows.iter().zip(forces).enumerate() {
+            let load =
+                row.bond.as_ref().filter(|bond| !bond.is_broken).map_or(0.0, |bond| -force.value() / bond.strength);
             if load >= 1.0 {
-                broken.push((bond.row, load));
+                broken.push((index, load));
             }
         }
     }
 
     fn set_broken(&mut self, features: &[usize]) {
-        for bond in &mut self.bonds {
-            bond.is_broken = features.binary_search(&bond.row).is_ok();
+        for (index, row) in self.rows.iter_mut().enumerate() {
+            row.bond.iter_mut().for_each(|bond| bond.is_broken = features.binary_search(&index).is_ok());
         }
     }
 
     fn variation(&self) -> Variation {
         // A broken bond has another law, and may have friction.
-        if self.bonds.is_empty() { Variation::Never } else { Variation::BySearch }
+        if self.rows.iter().any(|row| row.bond.is_some()) { Variation::BySearch } else { Variation::Never }
     }
 }

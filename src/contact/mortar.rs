@@ -10,10 +10,13 @@ mod points;
 mod rates;
 mod rows;
 mod second_order;
+mod strength;
 
-use super::surface::{Bounds, Facet, Material, Nodes, Point, RECOVERY, Ramp, Reach, Surface, Thickness, sub};
+use super::affine_rows::SearchState;
+use super::surface::{Bounds, Facet, Nodes, Point, RECOVERY, Surface, Vicinity, sub};
 use super::{
-    BondStrength, Candidates, ContactConstraint, ContactId, ContactLaw, Contacts, GapRates, Rates, Stride, check_local,
+    Candidates, ContactConstraint, ContactId, Contacts, GapRates, OPEN, Rates, Stride, SurfaceSettings, check_local,
+    surface_settings,
 };
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -23,12 +26,11 @@ use integrals::Integrals;
 use pairs::Pairs;
 use rows::{Made, Rows};
 
+pub use strength::BondStrength;
+
 /// The largest angle (radians) by which a surface may turn around a convex side: 60°, and 0.6° for rounding, so that
 /// a circle of six segments is accepted in both precisions.
 const CORNER: f64 = std::f64::consts::FRAC_PI_3 + 0.01;
-
-/// Gap, as a share of the reach, above which an uncovered row is open.
-const OPEN: f64 = 0.01;
 
 /// Relative motion since the search, as a share of the smallest facet, up to which an uncovered row stays as it was:
 /// a node that slides off the rim finishes its step.
@@ -72,10 +74,10 @@ const BEYOND: f64 = 0.25;
 /// over the rim of the master finishes its step with its last row. If the surfaces have moved by more than a quarter
 /// of a facet since the search, it is lost ([`Error::ContactLost`], and a smaller step helps). A step is rejected
 /// ([`Error::PassedThrough`], and a smaller step helps) if a surface has penetrated the other by more than a tenth of
-/// its path, or half of the [reach](Self::reach). Geometry is computed in `f64` in every run.
+/// its path, or half of the [reach](SurfaceSettings::reach). Geometry is computed in `f64` in every run.
 ///
 /// Facets that penetrate each other by more than half of the material behind both, in the reference configuration,
-/// face each other through the bodies and are not in contact. So bodies may be thinner than the [reach](Self::reach)
+/// face each other through the bodies and are not in contact. So bodies may be thinner than the [reach](SurfaceSettings::reach)
 /// if their whole surfaces are given. As thin bodies have edges, use [`BodyContact`](super::BodyContact) for them.
 ///
 /// # Known failure
@@ -116,19 +118,13 @@ const BEYOND: f64 = 0.25;
 #[derive(Debug)]
 pub struct Mortar<T: Real> {
     nodes: Nodes,
-    slave: Surface,
-    master: Surface,
-    law: ContactLaw,
-    friction: f64,
-    reach: Reach,
-    thickness: Thickness,
+    /// The slave and the master.
+    surfaces: [Surface; 2],
+    settings: SurfaceSettings<T>,
+    vicinity: Vicinity,
     bonds: Option<Bonds<T>>,
     multiplier: Multiplier,
     pairs: Pairs,
-    /// The material behind the facets of both surfaces; none before it is needed.
-    material: Option<[Material; 2]>,
-    /// Positions at the last search, by body and place of the node there.
-    searched_at: [Vec<Point>; 2],
     integrals: Integrals,
     /// The state for which the integrals of the pairs are valid, if any: the number of changes of the positions, and
     /// the factor of the offsets (its bits).
@@ -136,12 +132,22 @@ pub struct Mortar<T: Real> {
     rows: Rows<T>,
     /// Rows of the search in progress.
     found: Rows<T>,
-    /// Work space of `inspect`.
-    look: passage::Look,
-    /// Work space of `rates`, and the time that the last search looks ahead.
-    rates: rates::Rates,
-    ahead: f64,
+    work: Work,
 }
+
+/// Positions of the last search, and work space.
+#[derive(Debug, Default)]
+struct Work {
+    /// Positions at the last search, by body and place of the node there.
+    searched_at: [Vec<Point>; 2],
+    /// The time that the last search looks ahead.
+    ahead: f64,
+    /// Work space of `inspect` and of `rates`.
+    inspection: passage::Inspection,
+    rates: rates::Rates,
+}
+
+surface_settings!(Mortar<T>);
 
 impl<T: Real> Mortar<T> {
     /// Contact of the facets of a `slave` surface, whose nodes get the rows, with the facets of a `master`.
@@ -165,7 +171,7 @@ impl<T: Real> Mortar<T> {
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
         let contact = Self::without_corner_check(coordinates, dofs, slave, master)?;
-        for surface in [&contact.slave, &contact.master] {
+        for surface in &contact.surfaces {
             if let Some(node) = surface.sharp_nodes(CORNER, &contact.nodes.coordinates).first() {
                 let reason = "weighted gaps alone let corners and edges penetrate, and the bodies may then gain \
                               energy; use BodyContact, or give only the sides that face each other";
@@ -185,43 +191,23 @@ impl<T: Real> Mortar<T> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        let (nodes, [slave, master]) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
+        let (nodes, surfaces) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
+        let settings = SurfaceSettings::new();
+        let typical = surfaces[0].typical().max(surfaces[1].typical());
         Ok(Self {
+            vicinity: Vicinity::new(&settings, nodes.coordinates.len(), typical, false)?,
             nodes,
-            reach: Reach::new(slave.typical().max(master.typical())),
-            slave,
-            master,
-            law: ContactLaw::Rigid,
-            friction: 0.0,
-            thickness: Thickness::default(),
+            surfaces,
+            settings,
             bonds: None,
             multiplier: Multiplier::default(),
             pairs: Pairs::default(),
-            material: None,
-            searched_at: [Vec::new(), Vec::new()],
             integrals: Integrals::default(),
             known: None,
             rows: Rows::new(),
             found: Rows::new(),
-            look: passage::Look::default(),
-            rates: rates::Rates::default(),
-            ahead: 0.0,
+            work: Work::default(),
         })
-    }
-
-    /// Sets the law of all rows.
-    #[must_use]
-    pub fn with_law(mut self, law: ContactLaw) -> Self {
-        self.law = law;
-        self
-    }
-
-    /// Sets Coulomb's friction with a coefficient μ ≥ 0. Slip is the mean velocity of the slave relative to the
-    /// opposite points of the master, weighted as the gap.
-    #[must_use]
-    pub fn friction(mut self, coefficient: f64) -> Self {
-        self.friction = coefficient;
-        self
     }
 
     /// Bonds the surfaces to each other where they touch in the reference configuration, within a tenth of a facet.
@@ -257,17 +243,25 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [`offsets`](Self::offsets) or [`dual`](Self::dual). If the surfaces do not touch
+    /// [`Error::Incompatible`] with [offsets](SurfaceSettings::offsets) or [`dual`](Self::dual). If the surfaces do not touch
     /// anywhere, the first search fails ([`Error::Empty`]).
     pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
-        self.bonds = Some(Bonds::new(self.nodes.clone(), [self.slave.clone(), self.master.clone()], strength));
-        self.with_fitting_bonds()
+        self.bonds = Some(Bonds::new(self.nodes.clone(), self.surfaces.clone(), strength));
+        self.check_bonds()?;
+        Ok(self)
+    }
+
+    fn apply_settings(&mut self) -> Result<()> {
+        let typical = self.surfaces[0].typical().max(self.surfaces[1].typical());
+        self.vicinity = Vicinity::new(&self.settings, self.nodes.coordinates.len(), typical, false)?;
+        self.known = None;
+        self.check_bonds()
     }
 
     /// Rejects bonds together with offsets, because touching parts are found for the facets, and with dual functions.
-    fn with_fitting_bonds(self) -> Result<Self> {
+    fn check_bonds(&self) -> Result<()> {
         let (part, reason) = match (self.bonds.is_some(), self.multiplier) {
-            (true, _) if !self.thickness.is_none() => (
+            (true, _) if !self.vicinity.thickness.is_none() => (
                 "bonds between surfaces with offsets",
                 "what is bonded is found where facets lie upon each other; give facets on the surfaces",
             ),
@@ -275,59 +269,9 @@ impl<T: Real> Mortar<T> {
                 "bonds beside dual functions",
                 "rows of bonds have standard ones: beside each other they would not add up to one",
             ),
-            _ => return Ok(self),
+            _ => return Ok(()),
         };
         Err(Error::Incompatible { part: part.into(), reason })
-    }
-
-    /// Sets how far (length) the surfaces of the bodies lie outside of their facets, by node of the mesh: half the
-    /// thickness of a shell whose facets are its middle surface, the thickness of a coating; negative if they lie
-    /// inside. Between nodes the shape functions interpolate. The gap is n·(x_m − x_s) less the offsets of both.
-    ///
-    /// Forces act on the facets; the lever arm of a friction force about the middle surface is left out.
-    ///
-    /// ```
-    /// use contact_dynamics::ContactConstraint;
-    /// use contact_dynamics::contact::Mortar;
-    ///
-    /// // The middle surfaces of two sheets, 0.1 apart, of which each is 0.06 thick.
-    /// let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.1], [1.0, 0.1]];
-    /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-    /// let mut contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])?.offsets(&[0.03; 4])?;
-    /// contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0)?;
-    /// let mut gaps = [0.0; 2];
-    /// contact.gaps(0.0, &[0.0; 8], &mut gaps)?;
-    /// assert!(gaps.iter().all(|gap: &f64| (gap - 0.04).abs() < 1e-15));
-    /// # Ok::<(), contact_dynamics::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Dimension`] unless there is one offset per node of the mesh; [`Error::NotFinite`] (index: node);
-    /// [`Error::Incompatible`] with [bonds](Self::bonded).
-    pub fn offsets(mut self, offsets: &[T]) -> Result<Self> {
-        self.thickness.set(offsets, self.nodes.coordinates.len())?;
-        self.reach.forget();
-        self.material = None;
-        self.known = None;
-        self.with_fitting_bonds()
-    }
-
-    /// Scales all [`offsets`](Self::offsets) in time: by the factor `factors[0]` until `times[0]`, by `factors[1]`
-    /// from `times[1]` on. In between the factor is smooth, without a jump of velocity or acceleration (a polynomial
-    /// of the fifth degree).
-    ///
-    /// For a press fit whose meshes overlap by d, start with offsets whose sum is −d, and factors from 1 to 0. If the
-    /// meshes just fit, use a sum of d and factors from 0 to 1.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless all values are finite and the second time is later.
-    pub fn ramp(mut self, times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
-        self.thickness.ramp = Ramp::new(times, factors)?;
-        self.material = None;
-        self.known = None;
-        Ok(self)
     }
 
     /// Weights gaps with dual functions of the multiplier instead of the shape functions N. On each slave facet
@@ -379,29 +323,7 @@ impl<T: Real> Mortar<T> {
     pub fn dual(mut self) -> Result<Self> {
         self.multiplier = Multiplier::Dual;
         self.known = None;
-        self.with_fitting_bonds()
-    }
-
-    /// Sets the least distance (length), outside and inside, at which facets are found; by default the mean size of
-    /// the facets, of the coarser surface. The motion within a step is added by the velocities.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn reach(mut self, reach: T) -> Result<Self> {
-        self.reach.set_least(reach)?;
-        self.material = None;
-        Ok(self)
-    }
-
-    /// Sets how far (length) the surfaces may move relative to each other before lists of pairs are rebuilt; the
-    /// default is half of the search range. It changes the cost, not the result.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parameter`] unless positive and finite.
-    pub fn skin(mut self, skin: T) -> Result<Self> {
-        self.reach.set_skin(skin)?;
+        self.check_bonds()?;
         Ok(self)
     }
 
@@ -412,51 +334,48 @@ impl<T: Real> Mortar<T> {
     }
 
     fn tangents(&self) -> usize {
-        if self.friction == 0.0 { 0 } else { self.nodes.dimension - 1 }
+        if self.settings.given_friction() == 0.0 { 0 } else { self.nodes.dimension - 1 }
     }
 
     fn finest(&self) -> f64 {
-        self.slave.finest().min(self.master.finest())
+        self.surfaces[0].finest().min(self.surfaces[1].finest())
     }
 
     /// A bound of the relative motion of the surfaces since the last search.
     fn moved_since_search(&self) -> f64 {
         let [one, other] = [0, 1].map(|body| {
             let moved = |(&node, &before): (&usize, &Point)| sub(self.nodes.positions[node], before);
-            Bounds::of_points(self.nodes.bodies()[body].iter().zip(&self.searched_at[body]).map(moved))
+            Bounds::of_points(self.nodes.bodies()[body].iter().zip(&self.work.searched_at[body]).map(moved))
         });
         one.farthest(&other)
     }
 
     /// Lower bound (≤ 0) and upper bound (≥ 0) of the sum of the offsets of both surfaces at t.
     fn thickest(&self, t: f64) -> [f64; 2] {
-        self.thickness.bounds(self.nodes.bodies(), self.thickness.ramp.at(t))
+        self.vicinity.thickness.bounds(self.nodes.bodies(), self.vicinity.thickness.ramp.at(t))
     }
 
     /// The largest penetration at t at which surfaces are found.
     fn depth(&self, t: f64) -> f64 {
-        self.reach.least() - self.thickest(t)[0]
+        self.vicinity.reach.least() - self.thickest(t)[0]
     }
 
     /// Finds the material behind facets, unless it is known.
     fn find_material(&mut self) {
-        if self.material.is_none() {
-            let known = (self.reach.least(), self.thickness.overlap(self.nodes.bodies()));
-            let of = |surface: &Surface| Material::of(surface, &self.nodes.coordinates, known);
-            self.material = Some([of(&self.slave), of(&self.master)]);
-        }
+        let Self { vicinity, surfaces, nodes, .. } = self;
+        vicinity.prepare(&surfaces.each_ref(), nodes.bodies(), &nodes.coordinates);
     }
 
     /// Finds the pairs of facets within `range` at the current positions, at t.
     fn find_pairs(&mut self, t: f64, range: f64) {
         let depth = self.depth(t);
         self.find_material();
-        let surfaces = [&self.slave, &self.master];
-        let motions = self.reach.motions(&self.nodes);
-        if let Some(listed) = self.reach.renew(&motions, range, &self.nodes.positions) {
+        let surfaces = self.surfaces.each_ref();
+        let motions = self.vicinity.reach.motions(&self.nodes);
+        if let Some(listed) = self.vicinity.reach.renew(&motions, range, &self.nodes.positions) {
             self.pairs.build(surfaces, &self.nodes.positions, listed);
         }
-        if let Some(material) = &self.material
+        if let Some(material) = self.vicinity.material_of(1)
             && self.pairs.take_near(surfaces, material, &self.nodes.positions, (range, depth))
         {
             self.known = None;
@@ -466,13 +385,13 @@ impl<T: Real> Mortar<T> {
     /// Integrates at the current positions, unless the integrals are known there: usually a step begins where the
     /// rows of the last one were linearized.
     fn integrate(&mut self, t: f64) {
-        let present = Some((self.nodes.moves(), self.thickness.ramp.at(t).to_bits()));
+        let present = Some((self.nodes.moves(), self.vicinity.thickness.ramp.at(t).to_bits()));
         if self.known == present {
             return;
         }
         self.known = present;
-        let Self { integrals, slave, master, nodes, pairs, thickness, multiplier, .. } = self;
-        integrals.integrate([slave, master], &nodes.positions, thickness.at(t), *multiplier, pairs);
+        let Self { integrals, surfaces, nodes, pairs, vicinity, multiplier, .. } = self;
+        integrals.integrate(surfaces.each_ref(), &nodes.positions, vicinity.thickness.at(t), *multiplier, pairs);
     }
 }
 
@@ -485,11 +404,10 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         let Rows { affine, places, spots, tangents } = &self.rows;
         let count = self.tangents();
         for (row, (&place, spot)) in places.iter().zip(spots).enumerate() {
-            let size = spot.position.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            let name = (self.slave.nodes()[place], 0);
-            let mut contact = contacts.push_row(name, self.law, (&affine.jacobian, row));
-            contact.magnitude(T::of(size)).position(spot.position.map(T::of)).normal(spot.normal.map(T::of));
-            contact.friction(self.friction).recovery(T::of(RECOVERY * self.finest()));
+            let name = (self.surfaces[0].nodes()[place], 0);
+            let mut contact = contacts.push_row(name, self.settings.given_law(), (&affine.jacobian, row));
+            contact.at(spot.position, spot.normal);
+            contact.friction(self.settings.given_friction()).recovery(T::of(RECOVERY * self.finest()));
             (row * count..(row + 1) * count).for_each(|tangent| contact.tangent_row((tangents, tangent)));
         }
         if let Some(bonds) = &self.bonds {
@@ -499,12 +417,12 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
 
     fn search(&mut self, t: f64, u: &[T], v: &[T], ahead: f64) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
-        self.ahead = ahead;
+        self.work.ahead = ahead;
         let boxes = self.nodes.move_to(u)?;
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         let thickness = self.thickest(t)[1].max(self.thickest(t + ahead)[1]);
-        let range = self.reach.least() + thickness + ahead * speeds[0].farthest(&speeds[1]);
-        for (places, body) in self.searched_at.iter_mut().zip(self.nodes.bodies()) {
+        let range = self.vicinity.reach.least() + thickness + ahead * speeds[0].farthest(&speeds[1]);
+        for (places, body) in self.work.searched_at.iter_mut().zip(self.nodes.bodies()) {
             places.clear();
             places.extend(body.iter().map(|&node| self.nodes.positions[node]));
         }
@@ -512,19 +430,19 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         if boxes[0].inflated(range).intersects(&boxes[1]) {
             self.find_pairs(t, range);
             self.integrate(t);
-            let (rubs, factor) = (self.tangents() > 0, self.thickness.ramp.at(t));
-            let made = Made { rubs, nodes: &self.nodes, slave: &self.slave, factor, u };
+            let (rubs, factor) = (self.tangents() > 0, self.vicinity.thickness.ramp.at(t));
+            let made = Made { rubs, nodes: &self.nodes, slave: &self.surfaces[0], factor, u };
             let is_bonded = |place: usize| self.bonds.as_ref().is_some_and(|bonds| bonds.hold(place));
-            for place in (0..self.slave.nodes().len()).filter(|&place| !is_bonded(place)) {
+            for place in (0..self.surfaces[0].nodes().len()).filter(|&place| !is_bonded(place)) {
                 self.found.push(place, &mut self.integrals, &made);
             }
         } else {
             self.pairs.clear();
             self.known = None;
         }
-        let Self { bonds, slave, .. } = self;
+        let Self { bonds, surfaces: [slave, _], .. } = self;
         let tied = match bonds {
-            Some(bonds) => bonds.search(slave, (t, u, v), ahead)?,
+            Some(bonds) => bonds.search(slave, &SearchState { t, u, v, ahead })?,
             None => Candidates::Unchanged,
         };
         let same = self.rows.places == self.found.places && self.rows.affine.jacobian == self.found.affine.jacobian;
@@ -548,8 +466,8 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
         // Evaluated only if a row is uncovered.
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
         let near = self.rows.places.iter().all(is_covered) || self.moved_since_search() <= BEYOND * self.finest();
-        let Self { rows, found, integrals, nodes, slave, reach, thickness, .. } = self;
-        let made = Made { rubs: count > 0, nodes, slave, factor: thickness.ramp.at(t), u };
+        let Self { rows, found, integrals, nodes, surfaces: [slave, _], vicinity, .. } = self;
+        let made = Made { rubs: count > 0, nodes, slave, factor: vicinity.thickness.ramp.at(t), u };
         for (row, &place) in rows.places.iter().enumerate() {
             if found.push(place, integrals, &made) {
                 continue;
@@ -557,7 +475,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             // The row is no longer covered. An open row stays open, and a node just beyond the rim finishes its step.
             let spot = &rows.spots[row];
             let gap = rows.affine.gap(row, u).value() - (made.factor - spot.factor) * spot.offset;
-            if !near && gap <= OPEN * reach.least() {
+            if !near && gap <= OPEN * vicinity.reach.least() {
                 let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
                 return Err(Error::ContactLost { t, contact });
             }
@@ -569,7 +487,7 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.thickness.ramp.at(t);
+        let factor = self.vicinity.thickness.ramp.at(t);
         let (own, tied) = gaps.split_at_mut(self.rows.spots.len());
         for (row, (gap, spot)) in own.iter_mut().zip(&self.rows.spots).enumerate() {
             *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);
@@ -596,11 +514,11 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
 
     fn set_broken(&mut self, features: &[usize]) {
         if let Some(bonds) = &mut self.bonds {
-            bonds.set_broken(&self.slave, features);
+            bonds.set_broken(&self.surfaces[0], features);
         }
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        self.look_at(step)
+        self.check_step(step)
     }
 }

@@ -4,12 +4,11 @@ mod candidates;
 mod constraint;
 mod passage;
 mod rows;
-mod settings;
 
 #[cfg(doc)]
 use super::ContactConstraint;
 use super::surface::{Bounds, Cones, Facet, NearestFirst, Nodes, Point, RECOVERY, Surface, Vicinity, add_scaled};
-use super::{ContactLaw, check_nodes};
+use super::{SurfaceSettings, check_nodes, surface_settings};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use rows::Rows;
@@ -40,7 +39,7 @@ impl Pass {
 /// positive outside), `g = n · (x_s − Σ N_i x_i)`. Its row of G is n on the dofs of the node and −N_i n on the dofs
 /// of the facet's nodes. Since Σ N_i = 1 and x_s − Σ N_i x_i is parallel to n, contact forces conserve momentum, and
 /// angular momentum at the configuration of the search (up to lever arms of √ε of a facet on its sides, see below).
-/// Nodes at a depth of up to the [`reach`](Self::reach) are found as well as nodes outside.
+/// Nodes at a depth of up to the [`reach`](SurfaceSettings::reach) are found as well as nodes outside.
 ///
 /// # Linearization
 ///
@@ -101,9 +100,9 @@ impl Pass {
 ///
 /// The bounding boxes of the two surfaces are compared first; if they are apart by more than `reach`, there are no
 /// candidates. Otherwise each node tries the facets of its list. Lists hold the facets within `reach` and a
-/// [`skin`](Self::skin). They are rebuilt, from an R*-tree, when nodes of the two surfaces have moved by more than
-/// the skin relative to each other (in any coordinate). Memory is allocated only then. Bodies that fly together need
-/// no rebuilds.
+/// [`skin`](SurfaceSettings::skin). They are rebuilt, from an R*-tree, when nodes of the two surfaces have moved by
+/// more than the skin relative to each other (in any coordinate). Memory is allocated only then. Bodies that fly
+/// together need no rebuilds.
 ///
 /// ```
 /// use contact_dynamics::ContactConstraint;
@@ -114,7 +113,7 @@ impl Pass {
 /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
 /// let mut contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]])?;
 ///
-/// // The dofs in the order in which the constraint reads them: those of the node come first.
+/// // The dofs in the order of the constraint: the dofs of the node come first.
 /// assert_eq!(contact.dofs(), [6, 7, 0, 1, 2, 3, 4, 5]);
 /// let mut u = [0.0; 8];
 /// contact.search(0.0, &u, &[0.0; 8], 0.0)?;
@@ -138,8 +137,7 @@ pub struct NodeToFacet<T: Real> {
     /// The nodes' own facets, if known.
     own_surface: Option<Surface>,
     passes: Vec<Pass>,
-    law: ContactLaw,
-    friction: f64,
+    settings: SurfaceSettings<T>,
     vicinity: Vicinity,
     rebuilds: usize,
     /// The cones of the normals of both surfaces at the last search.
@@ -148,6 +146,8 @@ pub struct NodeToFacet<T: Real> {
     /// Rows of the search in progress.
     found: Rows<T>,
 }
+
+surface_settings!(NodeToFacet<T>);
 
 impl<T: Real> NodeToFacet<T> {
     /// Contact of two surfaces in two passes: nodes of the facets `one` with the facets `other`, and the reverse.
@@ -174,7 +174,7 @@ impl<T: Real> NodeToFacet<T> {
     /// let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
     /// let mut contact = NodeToFacet::new(&coordinates, &dofs, [[3, 4]], [[0, 1], [1, 2]])?;
     /// contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0)?;
-    /// // (Of the lower nodes only the middle one is below the upper side.)
+    /// // Of the lower nodes only the middle one is below the upper side.
     /// assert_eq!(Contacts::of(&contact).len(), 3);
     /// # Ok::<(), contact_dynamics::Error>(())
     /// ```
@@ -235,37 +235,39 @@ impl<T: Real> NodeToFacet<T> {
             let part = format!("contact node {node}");
             return Err(Error::Incompatible { part, reason: "it is listed twice" });
         }
-        let mut contact = Self::between(mesh, sorted, surface);
+        let mut contact = Self::between(mesh, sorted, surface, None)?;
         contact.prepare()?;
         Ok(contact)
     }
 
-    /// From nodes (ascending) and a surface; memory for rows is not reserved yet.
-    fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface) -> Self {
-        Self {
+    /// From nodes (ascending), a surface, and the same surface again if it is against itself; memory for rows is not
+    /// reserved yet.
+    fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface, own_surface: Option<Surface>) -> Result<Self> {
+        let settings = SurfaceSettings::new();
+        Ok(Self {
             ends: [mesh.coordinates.clone(), mesh.coordinates.clone()],
+            vicinity: Vicinity::new(&settings, mesh.coordinates.len(), surface.typical(), own_surface.is_some())?,
             nodes: mesh,
-            vicinity: Vicinity::new(surface.typical()),
             surface,
-            own_surface: None,
+            own_surface,
             passes: vec![Pass::new(nodes)],
-            law: ContactLaw::Rigid,
-            friction: 0.0,
+            settings,
             rebuilds: 0,
             cones: [Cones::default(), Cones::default()],
             rows: Rows::with_capacity(0, 0),
             found: Rows::with_capacity(0, 0),
-        }
+        })
     }
 
     /// Contact of a surface with itself: of its nodes with all of its facets that are not around them. Use it for
     /// bodies that fold, and for several bodies whose surfaces are given as one.
     ///
-    /// Some facets of a node's own body are excluded. These are the facets within one [ring](Self::rings), and facets
-    /// that the node is behind by more than half of the material there, in the reference configuration. So no body
-    /// may penetrate itself in that configuration. Facets that do not face the node are excluded too. As for two
-    /// surfaces, their normal is within 60° of the node's normal. The limit is 102° for facets beside the node in the
-    /// reference configuration, up to two reaches or two facets away, unless the node is in front of them.
+    /// Some facets of a node's own body are excluded. These are the facets within one
+    /// [ring](SurfaceSettings::rings), and facets that the node is behind by more than half of the material there, in
+    /// the reference configuration. So no body may penetrate itself in that configuration. Facets that do not face
+    /// the node are excluded too. As for two surfaces, their normal is within 60° of the node's normal. The limit is
+    /// 102° for facets beside the node in the reference configuration, up to two reaches or two facets away, unless
+    /// the node is in front of them.
     ///
     /// Facets connected through shared nodes belong to one body. So do the hollows in it: closed parts whose normals
     /// point into them. Of two nodes that are each other's closest points the sharper one has a row, or else the one
@@ -285,7 +287,7 @@ impl<T: Real> NodeToFacet<T> {
     /// let mut contact = NodeToFacet::of_itself(&coordinates, &dofs, &surface)?;
     /// contact.search(0.0, &vec![0.0; contact.dofs().len()], &vec![0.0; contact.dofs().len()], 0.0)?;
     /// let contacts = Contacts::of(&contact);
-    /// // (Of two nodes right opposite one has the row; those at the foot have the other side within their ring.)
+    /// // One of two opposite nodes has the row; nodes at the foot have the other side within their ring.
     /// let nodes: Vec<usize> = (0..contacts.len()).map(|row| contacts.name(row).0).collect();
     /// assert_eq!(nodes, [9, 13]);
     /// # Ok::<(), contact_dynamics::Error>(())
@@ -301,11 +303,26 @@ impl<T: Real> NodeToFacet<T> {
     ) -> Result<Self> {
         let mesh = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, D, &mesh.coordinates)?;
-        let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone());
-        contact.vicinity = Vicinity::of_itself(surface.typical());
-        contact.own_surface = Some(surface);
+        let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone(), Some(surface))?;
         contact.prepare()?;
         Ok(contact)
+    }
+
+    /// Sets the facets of the nodes' own surface. Then a node is in contact only with facets that face it: the angle
+    /// between their normal and its own, the mean of its facets' normals, must be at least 60°.
+    ///
+    /// This prevents contact with the far side of a thin body, and with facets that a node approaches from behind.
+    /// With the whole surface of its body it also prevents contact through that body.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`one_pass`](Self::one_pass) about facets.
+    pub fn facing<F: Into<Facet>>(mut self, facets: impl IntoIterator<Item = F>) -> Result<Self> {
+        let own = Surface::of_facets(facets, self.nodes.dimension, &self.nodes.coordinates)?;
+        self.own_surface = Some(own);
+        self.passes.truncate(1);
+        self.prepare()?;
+        Ok(self)
     }
 
     /// Index of the facet of a row of the last search, in the list of its pass.
@@ -313,9 +330,16 @@ impl<T: Real> NodeToFacet<T> {
         self.rows.stands[row].facet
     }
 
-    /// How often the lists of facets have been built. If this is often, a larger [`skin`](Self::skin) may save time.
+    /// How often the lists of facets have been built. If this is often, a larger [`skin`](SurfaceSettings::skin) may
+    /// save time.
     pub fn rebuilds(&self) -> usize {
         self.rebuilds
+    }
+
+    fn apply_settings(&mut self) -> Result<()> {
+        let (nodes, of_itself) = (self.nodes.coordinates.len(), self.vicinity.is_of_itself());
+        self.vicinity = Vicinity::new(&self.settings, nodes, self.surface.typical(), of_itself)?;
+        Ok(())
     }
 
     /// Checks that the bodies share no node, and reserves memory for rows.
@@ -355,11 +379,6 @@ impl<T: Real> NodeToFacet<T> {
     /// Largest penetration that is recovered in a step.
     fn recovery(&self) -> f64 {
         RECOVERY * self.finest()
-    }
-
-    /// Distance from a side or a vertex, as a share of a facet, below which it counts as rounding.
-    fn rounding() -> f64 {
-        T::epsilon().value().sqrt()
     }
 
     /// Position and velocity of a node.

@@ -12,7 +12,7 @@ use super::{
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use motion::{Course, Motion};
-use passage::{look_at, turns_too_far};
+use passage::{check_path, turns_too_far};
 
 /// A node: its index, its position at u = 0, and the places of the dofs of its displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,11 @@ impl<T: Real, const D: usize> Node<T, D> {
     }
 }
 
-type Roughness<'a, T, const D: usize> = Box<dyn Fn([T; D]) -> f64 + Send + 'a>;
+/// The friction coefficient: of all nodes, or by their position in space.
+enum Friction<'a, T, const D: usize> {
+    Constant(f64),
+    At(Box<dyn Fn([T; D]) -> f64 + Send + 'a>),
+}
 
 /// Velocity and acceleration of a point of the obstacle's surface at t.
 type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + Send + 'a>;
@@ -77,8 +81,7 @@ pub struct NodesOnObstacle<'a, T: Real, const D: usize> {
     law: ContactLaw,
     reach: T,
     motion: Motion<'a, T, D>,
-    friction: f64,
-    roughness: Option<Roughness<'a, T, D>>,
+    friction: Friction<'a, T, D>,
     drag: Option<Drag<'a, T, D>>,
     rows: Vec<Row<T, D>>,
     before: Vec<Row<T, D>>,
@@ -94,8 +97,6 @@ struct Row<T, const D: usize> {
     own_normal: [T; D],
     /// The normal in space.
     normal: [T; D],
-    /// The largest coordinate of the node, which sets the rounding of `place`.
-    size: T,
     /// The latest coordinates of the node.
     at: [T; D],
     /// Gap and normal at the search, in the frame of the obstacle.
@@ -111,7 +112,7 @@ impl<T: Real, const D: usize> Row<T, D> {
 
     /// Distance and normal of a point in the frame of the obstacle. For a point on the other side of the obstacle the
     /// tangent plane is used, so that a node cannot pass through undetected.
-    fn seen_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
+    fn distance_from(&self, obstacle: &dyn Obstacle<T, D>, place: [T; D]) -> (T, [T; D]) {
         let (distance, normal) = obstacle.distance(place);
         match dot(normal, self.own_normal) > T::zero() {
             true => (distance, normal),
@@ -157,7 +158,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
         let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
         let acts = vec![false; list.as_slice().len()];
-        let (reach, friction) = (T::infinity(), 0.0);
+        let (reach, friction) = (T::infinity(), Friction::Constant(0.0));
         let mut contact = Self {
             obstacle,
             dofs: list,
@@ -167,12 +168,11 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
             reach,
             motion: Motion::Rest,
             friction,
-            roughness: None,
             drag: None,
             rows,
             before,
         };
-        contact.settle_acting();
+        contact.find_acting_dofs();
         Ok(contact)
     }
 
@@ -196,13 +196,13 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// run.run_until(0.3, &mut ())?;
     /// assert!((run.state().velocity()[0] - 0.6).abs() < 1e-12); // μ g t
     /// run.run_until(1.0, &mut ())?;
-    /// assert!((run.state().velocity()[0] - 1.0).abs() < 1e-12); // that of the belt, from t = 0.5 on
+    /// assert!((run.state().velocity()[0] - 1.0).abs() < 1e-12); // the speed of the belt, from t = 0.5 on
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
     pub fn friction(mut self, coefficient: f64) -> Self {
-        self.friction = coefficient;
-        self.settle_acting();
+        self.friction = Friction::Constant(coefficient);
+        self.find_acting_dofs();
         self
     }
 
@@ -210,8 +210,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// step.
     #[must_use]
     pub fn friction_at(mut self, coefficient: impl Fn([T; D]) -> f64 + Send + 'a) -> Self {
-        self.roughness = Some(Box::new(coefficient));
-        self.settle_acting();
+        self.friction = Friction::At(Box::new(coefficient));
+        self.find_acting_dofs();
         self
     }
 
@@ -227,10 +227,10 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
 
     /// Finds the dofs on which rows may act: all with friction; for a fixed normal those along its nonzero
     /// components.
-    fn settle_acting(&mut self) {
+    fn find_acting_dofs(&mut self) {
         let normal = self.fixed_normal();
-        let rubs = self.roughness.is_some() || self.friction != 0.0;
-        self.acts.fill(rubs || normal.is_none());
+        let has_friction = !matches!(self.friction, Friction::Constant(0.0));
+        self.acts.fill(has_friction || normal.is_none());
         for (node, normal) in self.nodes.iter().filter_map(|node| normal.map(|normal| (node, normal))) {
             for (&place, weight) in node.dofs.iter().zip(normal) {
                 self.acts[place] |= weight != T::zero();
@@ -262,7 +262,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     #[must_use]
     pub fn moving(mut self, motion: impl FnMut(f64) -> [[T; D]; 3] + Send + 'a) -> Self {
         self.motion = Motion::Shifting(Box::new(motion));
-        self.settle_acting();
+        self.find_acting_dofs();
         self
     }
 
@@ -310,7 +310,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     #[must_use]
     pub fn turning(mut self, motion: impl FnMut(f64) -> RigidMotion<T, D> + Send + 'a) -> Self {
         self.motion = Motion::Turning(Box::new(motion));
-        self.settle_acting();
+        self.find_acting_dofs();
         self
     }
 
@@ -364,7 +364,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                     count += 1;
                 }
             }
-            let size = row.place.iter().fold(row.size.max(own), |most, x| most.max(x.abs()));
+            let size = row.place.iter().chain(&row.at).fold(own, |most, x| most.max(x.abs()));
             let mut contact = contacts.push((node.number, 0), self.law, &entries[..count]);
             let contact = contact.magnitude(size).position(in_space(row.at)).normal(in_space(row.normal));
             if row.friction == 0.0 {
@@ -391,8 +391,8 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         let course = Course::new([now, later], ahead);
         if !self.is_far(u, v, &course, ahead) {
             for (index, node) in self.nodes.iter().enumerate() {
-                let (x, size) = (node.at(u), |size: T, x: &T| size.max(x.abs()));
-                let (place, size) = (now.to_own(x), x.iter().fold(T::zero(), size));
+                let x = node.at(u);
+                let place = now.to_own(x);
                 let (distance, normal) = self.obstacle.distance(place);
                 let near = || distance <= self.reach + course.square(x, node.of(v).map(|v| ahead * v)).sqrt();
                 // NaN is kept, to be reported as a gap.
@@ -403,10 +403,12 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
                         distance,
                         own_normal: normal,
                         normal: now.direction(normal),
-                        size,
                         at: x,
                         start: (distance, normal),
-                        friction: self.roughness.as_ref().map_or(self.friction, |friction| friction(x)),
+                        friction: match &self.friction {
+                            Friction::Constant(coefficient) => *coefficient,
+                            Friction::At(coefficient) => coefficient(x),
+                        },
                     });
                 }
             }
@@ -427,7 +429,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
         let mut moved = Candidates::Unchanged;
         for row in &mut self.rows {
             let x = self.nodes[row.node].at(u);
-            (row.place, row.size) = (now.to_own(x), x.iter().fold(T::zero(), |size, x| size.max(x.abs())));
+            row.place = now.to_own(x);
             let (distance, own_normal) = self.obstacle.distance(row.place);
             let normal = now.direction(own_normal);
             (row.distance, row.own_normal, row.at) = (distance, own_normal, x);
@@ -459,20 +461,20 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             let row = rows.next_if(|(_, row)| row.node == index);
             let places = step.u.map(|u| node.at(u));
             let ends = [from.to_own(places[0]), to.to_own(places[1])];
-            let way = minus(ends[1], ends[0]);
-            let length = dot(way, way).sqrt() + course.bend(places[0], minus(places[1], places[0]));
+            let path = minus(ends[1], ends[0]);
+            let length = dot(path, path).sqrt() + course.bend(places[0], minus(places[1], places[0]));
             // A node without a row was farther away than the reach.
             let start = row.map_or(*reach, |(_, row)| row.start.0);
             if start > length {
                 continue;
             }
             let row = row.map(|(k, row)| (row, step.closed.map(|flags| flags[k])));
-            let looked = match turns_too_far(course.angle) {
+            let checked = match turns_too_far(course.angle) {
                 true => Err(("is near an obstacle that turns by more than 30 degrees in the step", start)),
-                false => look_at(&**obstacle, row, ends, from.own_velocity(places[0], node.of(step.v))),
+                false => check_path(&**obstacle, row, ends, from.own_velocity(places[0], node.of(step.v))),
             };
-            if let Err((what, gap)) = looked {
-                return Err(step.refuse((node.number, 0), what, length.value(), gap.value()));
+            if let Err((what, gap)) = checked {
+                return Err(step.rejected((node.number, 0), what, length.value(), gap.value()));
             }
         }
         Ok(())
@@ -486,7 +488,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             *gap = match (flat, turns) {
                 // The distance itself is affine. It is bitwise the same for any time of the last search.
                 (true, _) => self.obstacle.distance(place).0,
-                (false, true) => row.seen_from(&*self.obstacle, place).0,
+                (false, true) => row.distance_from(&*self.obstacle, place).0,
                 (false, false) => row.on_tangent_plane(place),
             };
         }
@@ -505,7 +507,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
             let mut rate = -dot(row.normal, velocity);
             if turns {
                 // Away from the point of linearization the gap has another normal, which adds to ġ besides G v.
-                let normal = now.direction(row.seen_from(&*self.obstacle, place).1);
+                let normal = now.direction(row.distance_from(&*self.obstacle, place).1);
                 rate += dot(minus(normal, row.normal), minus(v, velocity));
             }
             let curvature = self.obstacle.curvature(place, now.own_velocity(x, v));
@@ -538,7 +540,7 @@ impl<T: Real, const D: usize> ContactConstraint<T> for NodesOnObstacle<'_, T, D>
 
     fn variation(&self) -> Variation {
         match self.fixed_normal() {
-            Some(_) if self.reach.is_infinite() && self.roughness.is_none() => Variation::Never,
+            Some(_) if self.reach.is_infinite() && matches!(self.friction, Friction::Constant(_)) => Variation::Never,
             Some(_) => Variation::BySearch,
             None => Variation::Follows,
         }

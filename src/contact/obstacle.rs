@@ -1,13 +1,13 @@
 //! Rigid obstacles: bodies given by their signed distance.
 
 mod capsule;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod closed_surface;
 mod cone;
 mod cuboid;
 
 pub use capsule::Capsule;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 pub use closed_surface::ClosedSurface;
 pub use cone::Cone;
 pub use cuboid::Cuboid;
@@ -78,69 +78,48 @@ pub struct Passage<T> {
 fn trace<T: Real, const D: usize>(
     distance: impl Fn([T; D]) -> (T, [T; D]),
     from: [T; D],
-    way: [T; D],
+    path: [T; D],
 ) -> Option<Passage<T>> {
     const SHORTEST: f64 = 1.0 / 16.0;
     const HALVINGS: usize = 30;
-    let length = dot(way, way).sqrt();
-    let at = |s: T| distance(std::array::from_fn(|k| from[k] + s * way[k]));
+    let length = dot(path, path).sqrt();
+    let at = |s: T| distance(std::array::from_fn(|k| from[k] + s * path[k]));
     let (half, mut s) = (T::of(0.5), T::zero());
+    // The last point found outside, or the start.
+    let mut outside = s;
     let (mut gap, mut normal) = at(s);
     while s < T::one() && length > T::zero() {
+        if gap > T::zero() {
+            outside = s;
+        }
         let next = (s + (gap / length).max(T::of(SHORTEST))).min(T::one());
         let (next_gap, next_normal) = at(next);
-        if dot(normal, way) < T::zero() && dot(next_normal, way) > T::zero() {
+        if dot(normal, path) < T::zero() && dot(next_normal, path) > T::zero() {
             // The deepest point is in between.
             let (mut down, mut up) = (s, next);
             for _ in 0..HALVINGS {
                 let middle = half * (down + up);
-                match dot(at(middle).1, way) < T::zero() {
+                match dot(at(middle).1, path) < T::zero() {
                     true => down = middle,
                     false => up = middle,
                 }
             }
             let deepest = at(down).0;
             if deepest < T::zero() {
-                let (mut outside, mut inside) = (s, down);
-                for _ in 0..if gap > T::zero() { HALVINGS } else { 0 } {
+                let mut inside = down;
+                for _ in 0..if at(outside).0 > T::zero() { HALVINGS } else { 0 } {
                     let middle = half * (outside + inside);
                     match at(middle).0 > T::zero() {
                         true => outside = middle,
                         false => inside = middle,
                     }
                 }
-                return Some(Passage { depth: -deepest, steepness: -dot(at(outside).1, way) / length });
+                return Some(Passage { depth: -deepest, steepness: -dot(at(outside).1, path) / length });
             }
         }
         (s, gap, normal) = (next, next_gap, next_normal);
     }
     None
-}
-
-/// The passage through a ball around the origin, or through a cylinder if `from` and `way` are projected across its
-/// axis; `length` is the length of the whole path.
-fn through_round<T: Real, const D: usize>(
-    from: [T; D],
-    way: [T; D],
-    length: T,
-    radius: T,
-    side: Side,
-) -> Option<Passage<T>> {
-    let (square, along) = (dot(way, way), -dot(from, way));
-    // In a hollow body no straight path returns inside. In other bodies the deepest point must be between the ends.
-    if side == Side::Inside || !(along > T::zero() && along < square) {
-        return None;
-    }
-    let share = along / square;
-    let deepest: [T; D] = std::array::from_fn(|k| from[k] + share * way[k]);
-    let nearest = dot(deepest, deepest).sqrt();
-    let start = dot(from, from).sqrt();
-    // Where the path enters, its distance from the center is the radius; if it starts inside, the distance of the
-    // start.
-    let entry = start.min(radius);
-    let sine = (nearest / entry).min(T::one());
-    let steepness = (T::one() - sine * sine).sqrt() * square.sqrt() / length;
-    (nearest < radius).then_some(Passage { depth: radius - nearest, steepness })
 }
 
 /// A half-space: everything on the other side of a plane (a line in two dimensions).
@@ -176,10 +155,6 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Plane<T, D> {
 
     fn fixed_normal(&self) -> Option<[T; D]> {
         Some(self.normal)
-    }
-
-    fn passage(&self, _: [T; D], _: [T; D]) -> Option<Passage<T>> {
-        None
     }
 }
 
@@ -226,7 +201,7 @@ impl<T: Real, const D: usize> Sphere<T, D> {
     /// [`Error::Parameter`] unless the radius is positive and finite, [`Error::NotFinite`].
     pub fn new(center: [T; D], radius: T, side: Side) -> Result<Self> {
         finite("the center of the sphere", &center)?;
-        positive("the radius of the sphere", radius.value())?;
+        check_radius("the radius of the sphere", radius)?;
         Ok(Self { center, radius, side })
     }
 }
@@ -242,11 +217,6 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Sphere<T, D> {
 
     fn magnitude(&self) -> T {
         self.center.iter().fold(self.radius, |largest, x| largest.max(x.abs()))
-    }
-
-    fn passage(&self, from: [T; D], to: [T; D]) -> Option<Passage<T>> {
-        let way = minus(to, from);
-        through_round(minus(from, self.center), way, dot(way, way).sqrt(), self.radius, self.side)
     }
 }
 
@@ -274,7 +244,7 @@ impl<T: Real> Cylinder<T> {
     /// [`Error::Parameter`] if the axis is zero or unless the radius is positive and finite, [`Error::NotFinite`].
     pub fn new(point: [T; 3], axis: [T; 3], radius: T, side: Side) -> Result<Self> {
         finite("a point of the cylinder's axis", &point)?;
-        positive("the radius of the cylinder", radius.value())?;
+        check_radius("the radius of the cylinder", radius)?;
         Ok(Self { point, axis: unit("the axis of the cylinder", axis)?, radius, side })
     }
 
@@ -297,12 +267,6 @@ impl<T: Real> Obstacle<T, 3> for Cylinder<T> {
     fn magnitude(&self) -> T {
         self.point.iter().fold(self.radius, |largest, x| largest.max(x.abs()))
     }
-
-    fn passage(&self, from: [T; 3], to: [T; 3]) -> Option<Passage<T>> {
-        let way = minus(to, from);
-        let (length, start) = (dot(way, way).sqrt(), self.across(minus(from, self.point)));
-        through_round(start, self.across(way), length, self.radius, self.side)
-    }
 }
 
 /// Distance from a round surface for a point at `r` from its center or axis. At the center itself any normal is
@@ -318,37 +282,25 @@ fn round<T: Real, const D: usize>(r: [T; D], radius: T, side: Side) -> (T, [T; D
 
 /// wᵀ H w of a round surface: the square of the speed along it divided by the distance from its center or axis.
 fn round_curvature<T: Real, const D: usize>(r: [T; D], w: [T; D], side: Side) -> T {
-    let square = dot(r, r);
-    if !is_safe(square) {
-        // In units of the lengths, because w can be as far out of range as r.
-        let (distance, speed) = (length(r), length(w));
-        if distance == T::zero() || speed == T::zero() {
-            return T::zero();
-        }
-        let along = dot(r.map(|x| x / distance), w.map(|x| x / speed));
-        return side.sign::<T>() * speed * (speed / distance) * (T::one() - along * along).max(T::zero());
+    let (square, along) = (dot(r, r), dot(r, w));
+    match square > T::zero() {
+        true => side.sign::<T>() * (dot(w, w) - along * along / square) / square.sqrt(),
+        false => T::zero(),
     }
-    let along = dot(r, w);
-    side.sign::<T>() * (dot(w, w) - along * along / square) / square.sqrt()
 }
 
-/// Whether a sum of squares has neither overflowed nor underflowed.
-fn is_safe<T: Real>(square: T) -> bool {
-    square.is_finite() && square > T::min_positive_value() / T::epsilon()
-}
-
-/// |x|, also if its square overflows or underflows.
 fn length<T: Real, const D: usize>(x: [T; D]) -> T {
-    let square = dot(x, x);
-    if is_safe(square) {
-        return square.sqrt();
+    dot(x, x).sqrt()
+}
+
+/// Rejects a radius that is not positive and finite, or whose square is not a normal number: distances are computed
+/// from squares.
+fn check_radius<T: Real>(name: &'static str, radius: T) -> Result<()> {
+    positive(name, radius.value())?;
+    match (radius * radius).is_normal() {
+        true => Ok(()),
+        false => Err(Error::Parameter { name, value: radius.value(), range: "a length whose square is a number" }),
     }
-    let largest = x.iter().fold(T::zero(), |m, x| m.max(x.abs()));
-    if largest == T::zero() || !largest.is_finite() {
-        return square;
-    }
-    let scaled = x.map(|x| x / largest);
-    largest * dot(scaled, scaled).sqrt()
 }
 
 impl<T: Real, const D: usize, O: Obstacle<T, D> + ?Sized> Obstacle<T, D> for Box<O> {

@@ -3,6 +3,7 @@
 use super::obstacle::{dot, minus, unit_or_nan};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::half_digits;
 
 /// The position, velocity and acceleration of a rigid body at an instant.
 ///
@@ -229,16 +230,16 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
     }
 
     /// A bound of the distance of a path from the straight line between its ends, in the frame of a body that turns
-    /// by `angle`. The path is straight in space: from x, by `way` relative to the body's origin, in a time h. R ÿ is
+    /// by `angle`. The path is straight in space: from x, by `path` relative to the body's origin, in a time h. R ÿ is
     /// −a_c − ω × (ω × r) − 2 ω × w, and the distance of a curve from its chord is at most h² ÿ/8.
-    pub(super) fn bend(&self, x: [T; D], way: [T; D], angle: T, h: T) -> T {
+    pub(super) fn bend(&self, x: [T; D], path: [T; D], angle: T, h: T) -> T {
         if self.turn.is_none() {
             return T::zero();
         }
         let [at, _, acceleration] = self.origin;
         let length = |x: [T; D]| dot(x, x).sqrt();
-        let (r, way) = (length(minus(x, at)), length(way));
-        T::of(0.125) * (h * h * length(acceleration) + angle * (angle * (r + way) + way + way))
+        let (r, path) = (length(minus(x, at)), length(path));
+        T::of(0.125) * (h * h * length(acceleration) + angle * (angle * (r + path) + path + path))
     }
 
     /// Displacement of the origin.
@@ -260,7 +261,7 @@ impl<T: Real, const D: usize> RigidMotion<T, D> {
                 largest = largest.max((dot(*row, *other) - unit).abs());
             }
         }
-        if largest > T::epsilon().sqrt() {
+        if largest > half_digits() {
             return Err(Error::Parameter {
                 name: "the largest entry of R Rᵀ − 1, R the rotation of an obstacle,",
                 value: largest.value(),

@@ -106,8 +106,15 @@ impl<T: Real> Tie<T> {
         slave: impl IntoIterator<Item = F>,
         master: impl IntoIterator<Item = G>,
     ) -> Result<Self> {
-        let (nodes, [slave, master]) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
-        let mut tie = Self {
+        let (nodes, surfaces) = Nodes::with_surfaces(coordinates, dofs, slave, master)?;
+        let mut tie = Self::between(nodes, surfaces);
+        tie.join()?;
+        Ok(tie)
+    }
+
+    /// Between two surfaces that are not joined yet.
+    fn between(nodes: Nodes, [slave, master]: [Surface; 2]) -> Self {
+        Self {
             nodes,
             reach: REACH * slave.typical().max(master.typical()),
             slave,
@@ -118,9 +125,7 @@ impl<T: Real> Tie<T> {
             listed: Vec::new(),
             differences: SecondDifference::default(),
             ahead: 0.0,
-        };
-        tie.join()?;
-        Ok(tie)
+        }
     }
 
     /// Sets the largest gap or penetration (length), along the normal of the slave's facets, at which surfaces are
@@ -149,16 +154,11 @@ impl<T: Real> Tie<T> {
 
     /// Ties of bonds, which may break. Rows are along the normal of the slave and across it, and turn with the
     /// facets. Their dofs are the places in `nodes`.
-    pub(super) fn of_bonds(nodes: Nodes, [slave, master]: [Surface; 2]) -> Self {
-        let reach = REACH * slave.typical().max(master.typical());
-        let mut joint = Joint::new(&slave, &master, &nodes.coordinates, reach);
-        joint.align(&nodes);
-        let [rows, before] = [0, 1].map(|_| AffineRows::with_capacity(0, 0));
-        let differences = SecondDifference::default();
-        let mut tie =
-            Self { nodes, slave, master, reach, joint, rows, before, listed: Vec::new(), differences, ahead: 0.0 };
-        tie.list_rows(|_| true);
-        tie.linearize(&vec![T::zero(); tie.nodes.dofs().len()]);
+    pub(super) fn of_bonds(nodes: Nodes, surfaces: [Surface; 2]) -> Self {
+        let mut tie = Self::between(nodes, surfaces);
+        tie.joint = tie.find_joint();
+        tie.joint.align(&tie.nodes);
+        tie.start();
         tie
     }
 
@@ -167,13 +167,22 @@ impl<T: Real> Tie<T> {
         self.listed.iter().enumerate().filter(|(_, (_, axis))| *axis == 0).map(|(row, &(place, _))| (row, place))
     }
 
-    /// Finds the tied nodes, and their rows at zero displacement.
+    fn find_joint(&self) -> Joint {
+        Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach)
+    }
+
+    /// Finds the tied nodes, their dofs, and their rows at zero displacement.
     fn join(&mut self) -> Result<()> {
-        self.joint = Joint::new(&self.slave, &self.master, &self.nodes.coordinates, self.reach);
+        self.joint = self.find_joint();
         self.nodes.read_bodies([&self.slave, &self.master].map(|surface| self.joint.nodes_of(surface)))?;
+        self.start();
+        Ok(())
+    }
+
+    /// Makes the rows of all tied nodes at zero displacement.
+    fn start(&mut self) {
         self.list_rows(|_| true);
         self.linearize(&vec![T::zero(); self.nodes.dofs().len()]);
-        Ok(())
     }
 
     /// Makes the rows at the current positions of the nodes, with displacements u.

@@ -142,7 +142,7 @@ impl<T: Real> Start<'_, T> {
             for (row, &force) in contacts.lambda.iter().enumerate() {
                 let owner = constraints.tangents().owner(row);
                 let is_massless = constraints.tangents().act_on(g, owner, self.massless);
-                if constraints.law(owner).leaves_jumps() && !is_massless {
+                if !constraints.law(owner).is_compliant() && !is_massless {
                     projection.push(g, (&[row], &[force]), -T::one(), &mut motion.a)?;
                 }
             }

@@ -1,6 +1,6 @@
 //! Bodies with faces, corners and edges: what keeps them apart, and how many constraints that takes.
 
-use contact_dynamics::contact::{BodyContact, EdgeToEdge, Facet, Surface};
+use contact_dynamics::contact::{BodyContact, EdgeToEdge, Facet, Surface, SurfaceSettings};
 use contact_dynamics::{Composite, Error, PersistencyCorrection, Simulation, StepControl};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
@@ -33,7 +33,8 @@ fn a_body_has_the_constraints_that_its_shape_asks_for() {
     assert_eq!(contact.constraints().unwrap().len(), 4);
     // With a larger angle only what is sharper is: sides of a cube turn by a right angle.
     let right = std::f64::consts::FRAC_PI_2;
-    let blunt = over_a_box(cube(), cube().moved([0.0, 0.0, -3.0])).sharp(1.01 * right).unwrap();
+    let blunt =
+        over_a_box(cube(), cube().moved([0.0, 0.0, -3.0])).with(SurfaceSettings::new().sharp(1.01 * right)).unwrap();
     assert_eq!((blunt.sharp_nodes().clone(), blunt.constraints().unwrap().len()), ([vec![], vec![]], 1));
 }
 
@@ -60,7 +61,7 @@ fn a_surface_against_itself_has_nodes_and_edges() {
     assert_eq!(of_itself().sharp_nodes().each_ref().map(Vec::len), [2 * (8 + 12); 2]);
     assert_eq!(of_itself().constraints().unwrap().len(), 2);
     // What is not sharp has no edges.
-    assert_eq!(of_itself().sharp(1.6).unwrap().constraints().unwrap().len(), 1);
+    assert_eq!(of_itself().with(SurfaceSettings::new().sharp(1.6)).unwrap().constraints().unwrap().len(), 1);
     let square = Solid::rectangle([1.0; 2], [2; 2], MATERIAL);
     let surface = Surface::of_cells(&square.nodes, &square.elements).unwrap();
     let flat = BodyContact::of_itself(&square.nodes, &square.node_dofs(), &surface).unwrap();
@@ -76,7 +77,7 @@ fn edges_of_bodies_that_do_not_fold_do_not_meet_each_other() {
         let surface = Surface::of_cells(&solid.nodes, &solid.elements).unwrap();
         for reach in [0.05, 0.3, 2.0] {
             let edges = EdgeToEdge::of_itself(&solid.nodes, &solid.node_dofs(), &surface).unwrap();
-            let mut edges = edges.reach(reach).unwrap();
+            let mut edges = edges.with(SurfaceSettings::new().reach(reach)).unwrap();
             let velocity: Vec<f64> = solid.nodes.iter().flat_map(|[x, y, _]| [-y, *x, 0.0]).collect();
             for speed in [0.0, 1.0] {
                 let (u, v) = (vec![0.0; solid.dofs()], velocity.iter().map(|v| speed * v).collect::<Vec<_>>());
@@ -142,10 +143,10 @@ fn absurd_angles_and_reaches_are_refused() {
         )
     };
     for angle in [-0.1, 3.2, f64::NAN] {
-        assert!(matches!(contact().sharp(angle), Err(Error::Parameter { .. })), "{angle}");
+        assert!(matches!(contact().with(SurfaceSettings::new().sharp(angle)), Err(Error::Parameter { .. })), "{angle}");
     }
     for reach in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(contact().reach(reach).constraints(), Err(Error::Parameter { .. })), "{reach}");
+        assert!(matches!(contact().with(SurfaceSettings::new().reach(reach)), Err(Error::Parameter { .. })), "{reach}");
     }
 }
 

@@ -1,6 +1,8 @@
 //! Bonds: when they break, what is left of them, what a run remembers of it.
 
-use contact_dynamics::contact::{BondStrength, ContactConstraint, ContactLaw, GapOffset, LinearRows, Mortar};
+use contact_dynamics::contact::{
+    BondStrength, ContactConstraint, ContactLaw, GapOffset, LinearRows, Mortar, SurfaceSettings,
+};
 use contact_dynamics::observer::{Control, StepView};
 use contact_dynamics::{
     Composite, ContactStatus, Error, Newmark, PersistencyCorrection, Real, Simulation, SimulationBuilder, StepControl,
@@ -151,7 +153,7 @@ fn strengths_that_are_none_are_refused() {
     let stack = Stack::new([1, 1].map(|n| Solid::rectangle([1.0; 2], [n, 1], MATERIAL)), 0.0, |x| x);
     let glue = BondStrength::new(1.0, 1.0).unwrap();
     assert!(matches!(
-        stack.mortar(true).unwrap().bonded(glue).unwrap().offsets(&[0.1; 8]),
+        stack.mortar(true).unwrap().bonded(glue).unwrap().with(SurfaceSettings::new().offsets(&[0.1; 8])),
         Err(Error::Incompatible { .. })
     ));
 }

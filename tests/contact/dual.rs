@@ -2,7 +2,7 @@
 
 use super::mortar::{blocks, check_patches_of_blocks, check_patches_of_plates, plates, shaken};
 use super::two_bodies::check_impact;
-use contact_dynamics::contact::{BondStrength, ContactConstraint, Contacts, Facet, Mortar};
+use contact_dynamics::contact::{BondStrength, ContactConstraint, Contacts, Facet, Mortar, SurfaceSettings};
 use contact_dynamics::{Composite, Error, InitialOverclosure, Newmark, PersistencyCorrection, Simulation, verify};
 use contact_dynamics_scenes::second_order::{Family, SecondOrderStack};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -13,7 +13,7 @@ const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 }
 
 /// With a reach of less than the bodies.
 fn standard<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
-    stack.mortar(upper).unwrap().reach(0.3).unwrap()
+    stack.mortar(upper).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap()
 }
 
 fn dual<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
@@ -77,7 +77,10 @@ fn triangles(stack: &Stack<3>) -> Mortar<f64> {
     let [lower, upper] = stack.facets.each_ref().map(|facets| {
         facets.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).map(Facet::from).collect::<Vec<_>>()
     });
-    Mortar::new(&stack.solid.nodes, &stack.solid.node_dofs(), upper, lower).unwrap().reach(0.3).unwrap()
+    Mortar::new(&stack.solid.nodes, &stack.solid.node_dofs(), upper, lower)
+        .unwrap()
+        .with(SurfaceSettings::new().reach(0.3))
+        .unwrap()
 }
 
 #[test]
@@ -178,12 +181,14 @@ fn the_patch_test_on_facets_of_second_order() {
     let slanted = |[x, y]: [f64; 2]| [x, y + 0.35 * x * (2.0 - y) * y];
     let stack = SecondOrderStack::new(plates, Family::Serendipity, 0.0, slanted);
     for above in [true, false] {
-        let contact = stack.mortar(above).unwrap().reach(0.3).unwrap().dual().unwrap();
+        let contact = stack.mortar(above).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap().dual().unwrap();
         let error = stack.patch(contact).unwrap();
         assert!(error < 1e-12, "{error:e}");
     }
     let stack = SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), Family::Simplex, 0.0, |x| x);
-    let error = stack.patch(stack.mortar(true).unwrap().reach(0.3).unwrap().dual().unwrap()).unwrap();
+    let error = stack
+        .patch(stack.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap().dual().unwrap())
+        .unwrap();
     assert!(error < 1e-12, "{error:e}");
 }
 
@@ -322,7 +327,7 @@ fn rows_of_second_order_are_the_derivatives_of_gaps() {
         let bent = |[x, y]: [f64; 2]| [x, y + 0.1 * x * (1.0 - x)];
         let stack = SecondOrderStack::new([below, above], Family::Serendipity, 0.1, bent);
         let (u, v) = (shaken(stack.solid.dofs(), 0.01, seed), shaken(stack.solid.dofs(), 1.0, seed + 10));
-        let mut contact = stack.mortar(true).unwrap().reach(0.3).unwrap().dual().unwrap();
+        let mut contact = stack.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap().dual().unwrap();
         let error = verify::gap_jacobian(&mut contact, 0.0, &u, &v, 1e-6).unwrap();
         assert!(error.rows >= 3 && error.rows_lost == 0 && error.jacobian < 1e-8, "{shift}: {error:?}");
     }

@@ -1,6 +1,8 @@
 //! Edges on edges: gaps and rows against closed forms, momentum, impacts, edges that slide, what is refused.
 
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, EdgeToEdge, GapRates, Stride};
+use contact_dynamics::contact::{
+    ContactConstraint, ContactLaw, Contacts, EdgeToEdge, GapRates, Stride, SurfaceSettings,
+};
 use contact_dynamics::{Composite, Error, Newmark, PersistencyCorrection, Real, Simulation, TimeIntegrator, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
@@ -398,7 +400,7 @@ fn the_reach_is_a_distance_of_edges_whichever_way_they_lean() {
     for angles in [[0.0, 0.0], [0.4, -0.8], [1.0, 0.9]] {
         for (gap, near) in [(0.095, true), (0.105, false)] {
             let pair = Pair::new(0.9, [0.4, 0.55], gap).mapped(|x| turned(angles, x));
-            let rows = Pair::rows(&mut pair.contact().reach(0.1).unwrap());
+            let rows = Pair::rows(&mut pair.contact().with(SurfaceSettings::new().reach(0.1)).unwrap());
             assert_eq!(rows.len(), usize::from(near), "{angles:?} {gap}");
         }
     }
@@ -416,7 +418,7 @@ fn edges_that_may_come_to_meet_have_rows() {
     let row = ridges(&contact).unwrap();
     // As far away as they are, whichever of the two flies.
     for flies in [0..12, 12..24] {
-        let mut far = Pair::new(1.3, [0.5, 0.4], 9.0).contact::<f64>().reach(0.1).unwrap();
+        let mut far = Pair::new(1.3, [0.5, 0.4], 9.0).contact::<f64>().with(SurfaceSettings::new().reach(0.1)).unwrap();
         let down = if flies.start == 0 { -10.0 } else { 10.0 };
         let v: Vec<f64> = (0..24).map(|dof| if flies.contains(&dof) && dof % 3 == 2 { down } else { 0.0 }).collect();
         far.search_on(0.0, &[0.0; 24], &v, 0.8).unwrap();
@@ -440,9 +442,15 @@ fn edges_that_may_come_to_meet_have_rows() {
 fn absurd_input_is_refused() {
     let pair = Pair::new(1.0, [0.5, 0.5], 0.1);
     for angle in [-0.1, 3.2, f64::NAN] {
-        assert!(matches!(pair.contact::<f64>().sharp(angle), Err(Error::Parameter { .. })));
+        assert!(matches!(
+            pair.contact::<f64>().with(SurfaceSettings::new().sharp(angle)),
+            Err(Error::Parameter { .. })
+        ));
     }
-    assert!(pair.contact::<f64>().reach(0.0).is_err() && pair.contact::<f64>().skin(f64::NAN).is_err());
+    assert!(
+        pair.contact::<f64>().with(SurfaceSettings::new().reach(0.0)).is_err()
+            && pair.contact::<f64>().with(SurfaceSettings::new().skin(f64::NAN)).is_err()
+    );
     let [one, other] = [tetrahedron(0, &pair.nodes), tetrahedron(4, &pair.nodes)];
     let contact = EdgeToEdge::new(&pair.nodes, &Pair::dofs(), one, one);
     assert!(matches!(contact, Err(Error::Incompatible { .. })));
@@ -450,7 +458,10 @@ fn absurd_input_is_refused() {
     assert!(matches!(contact, Err(Error::Dimension { .. })));
     // All six edges of a tetrahedron turn by more than 60 degrees here; none by more than 180.
     assert_eq!(pair.contact::<f64>().edges().map(<[_]>::len), [6, 6]);
-    assert_eq!(pair.contact::<f64>().sharp(std::f64::consts::PI).unwrap().edges().map(<[_]>::len), [0, 0]);
+    assert_eq!(
+        pair.contact::<f64>().with(SurfaceSettings::new().sharp(std::f64::consts::PI)).unwrap().edges().map(<[_]>::len),
+        [0, 0]
+    );
     // Trial states that are not finite: an error where a step begins, gaps that say so within.
     let mut contact = pair.contact::<f64>();
     contact.search_on(0.0, &[0.0; 24], &[0.0; 24], 0.0).unwrap();

@@ -1,6 +1,6 @@
 //! Surfaces against themselves: what is met and what is not, hairpins whose arms meet, units.
 
-use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet, Surface};
+use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet, Surface, SurfaceSettings};
 use contact_dynamics::{Composite, EnergyMomentum, PersistencyCorrection, Simulation, StepControl};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::folding::Folding;
@@ -34,14 +34,14 @@ fn bodies_that_do_not_fold_do_not_meet_themselves() {
     let wedge = Solid::block([1.0; 3], [4; 3], MATERIAL).mapped(|[x, y, z]| [x, y, z * (0.02 + 0.4 * x)]);
     for solid in [&block, &plate, &wedge] {
         for reach in [0.1, 0.5, 3.0] {
-            let contact = of_itself(solid).reach(reach).unwrap();
+            let contact = of_itself(solid).with(SurfaceSettings::new().reach(reach)).unwrap();
             assert_eq!(rows(contact), [], "reach {reach}, {:?}", solid.nodes.last());
         }
     }
     let disc = Solid::disc(1.0, 6, MATERIAL);
-    assert_eq!(rows(of_itself(&disc).reach(5.0).unwrap()), []);
+    assert_eq!(rows(of_itself(&disc).with(SurfaceSettings::new().reach(5.0)).unwrap()), []);
     // Thrown and turned they do not either.
-    let mut contact = of_itself(&plate).reach(0.5).unwrap();
+    let mut contact = of_itself(&plate).with(SurfaceSettings::new().reach(0.5)).unwrap();
     let turned: Vec<f64> = plate.nodes.iter().flat_map(|[x, y, _]| [-y - x, x - y, 0.0]).collect();
     let velocity: Vec<f64> = plate.nodes.iter().flat_map(|[x, y, _]| [-10.0 * y, 10.0 * x, 0.0]).collect();
     contact.search_on(0.0, &turned, &velocity, 0.1).unwrap();
@@ -59,7 +59,7 @@ fn bodies_that_bend_do_not_meet_their_own_sides() {
         };
         let u: Vec<f64> = sheet.nodes.iter().flat_map(|&x| rolled(x)).collect();
         for reach in [0.05, 0.1, 0.2] {
-            let mut contact = of_itself(&sheet).reach(reach).unwrap();
+            let mut contact = of_itself(&sheet).with(SurfaceSettings::new().reach(reach)).unwrap();
             contact.search_on(0.0, &u, &vec![0.0; u.len()], 0.0).unwrap();
             assert_eq!(contact.candidates(), 0, "radius {radius}, reach {reach}");
         }
@@ -82,15 +82,15 @@ fn what_hangs_beside_an_edge_is_outside() {
     // the mean of the normals at the edge between both.
     let flat = Solid::rectangle([1.0; 2], [1; 2], MATERIAL)
         .with(Solid::rectangle([0.08, 1.0], [1, 1], MATERIAL).moved([1.02, 0.7]));
-    let found = rows(of_itself(&flat).reach(1.0).unwrap());
+    let found = rows(of_itself(&flat).with(SurfaceSettings::new().reach(1.0)).unwrap());
     assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
     let [below, beside] = [0, 1].map(|k| Surface::of_cells(&flat.nodes, &flat.elements[k..=k]).unwrap());
     let two = NodeToFacet::new(&flat.nodes, &flat.node_dofs(), &beside, &below).unwrap();
-    let found = rows(two.reach(1.0).unwrap());
+    let found = rows(two.with(SurfaceSettings::new().reach(1.0)).unwrap());
     assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
     let deep = Solid::block([1.0; 3], [1; 3], MATERIAL)
         .with(Solid::block([0.08, 0.5, 1.0], [1; 3], MATERIAL).moved([1.02, 0.2, 0.7]));
-    let found = rows(of_itself(&deep).reach(1.0).unwrap());
+    let found = rows(of_itself(&deep).with(SurfaceSettings::new().reach(1.0)).unwrap());
     assert!(found.len() > 1 && found.iter().all(|&(_, gap)| gap > 0.0), "{found:?}");
 }
 
@@ -112,7 +112,8 @@ fn arms_of_a_hairpin_face_each_other() {
 fn arms_meet_as_two_surfaces_do() {
     let folding = Folding::hairpin(0.1, 1.0);
     let run = |contact: NodeToFacet<f64>| {
-        let (system, contact) = (folding.solid.system::<f64>(), contact.reach(0.09).unwrap());
+        let (system, contact) =
+            (folding.solid.system::<f64>(), contact.with(SurfaceSettings::new().reach(0.09)).unwrap());
         folding.run(system, contact, Composite, (2e-3, 0.3)).unwrap()
     };
     let (own, two) = (run(folding.of_itself().unwrap()), run(folding.of_two_surfaces().unwrap()));
@@ -185,7 +186,7 @@ fn a_corner_on_a_node_has_the_row_of_both() {
         .rotated([0.0, 0.0, 1.0], 0.3)
         .moved([0.0, 0.0, 1e-3]);
     for pair in [block.clone().with(cube.clone()), cube.with(block)] {
-        let found = rows(of_itself(&pair).reach(0.1).unwrap());
+        let found = rows(of_itself(&pair).with(SurfaceSettings::new().reach(0.1)).unwrap());
         let [(node, gap)] = found[..] else { panic!("{found:?}") };
         assert!((pair.nodes[node][2] - 1e-3).abs() < 1e-12 && (gap - 1e-3).abs() < 1e-12, "{found:?}");
     }

@@ -3,7 +3,7 @@
 mod bipenalty;
 mod bodies;
 mod bonds;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod by_chance;
 mod constraints;
 mod curved;
@@ -25,7 +25,7 @@ mod pounding;
 mod rate_laws;
 mod searches;
 mod second_order;
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod shapes;
 mod surfaces;
 mod ties;

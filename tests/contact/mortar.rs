@@ -1,7 +1,9 @@
 //! Weighted gaps: patch tests, derivatives, momentum, impacts, what is covered in part, what is refused.
 
 use super::two_bodies::check_impact;
-use contact_dynamics::contact::{BodyContact, Candidates, ContactConstraint, ContactLaw, Contacts, Mortar, Stride};
+use contact_dynamics::contact::{
+    BodyContact, Candidates, ContactConstraint, ContactLaw, Contacts, Mortar, Stride, SurfaceSettings,
+};
 use contact_dynamics::{Composite, Error, Real, Simulation, StepControl, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::xorshift;
@@ -12,7 +14,7 @@ const MATERIAL: Material = Material { young: 100.0, poisson: 0.3, density: 1.0 }
 
 /// With a reach of less than the bodies.
 fn mortar<const D: usize>(stack: &Stack<D>, upper: bool) -> Mortar<f64> {
-    stack.mortar(upper).unwrap().reach(0.3).unwrap()
+    stack.mortar(upper).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap()
 }
 
 /// Blocks of hexahedra, one to lie upon the other.
@@ -397,7 +399,7 @@ fn look(contact: &mut Mortar<f64>, stack: &Stack<2>, t: [f64; 2], way: [f64; 2],
 fn steps_into_the_other_surface_are_told_from_steps_up_to_it_in_any_unit() {
     for unit in [1e-3, 1.0, 1e3] {
         let stack = |gap: f64| Stack::new(plates(3, 4), gap, |x| x.map(|x| unit * x));
-        let of = |stack: &Stack<2>| stack.mortar(true).unwrap().reach(0.3 * unit).unwrap();
+        let of = |stack: &Stack<2>| stack.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.3 * unit)).unwrap();
         let looked = |gap: f64, way: [f64; 2], closed: [bool; 2]| {
             let stack = stack(gap);
             look(&mut of(&stack), &stack, [0.0, 1.0], way.map(|x| unit * x), closed)
@@ -431,7 +433,8 @@ fn steps_into_the_other_surface_are_told_from_steps_up_to_it_in_any_unit() {
         assert_eq!(look(&mut contact, &soft, [0.0, 1.0], [0.0, -0.3 * unit], open), None);
         // Coatings that grow during the second one of two steps are in the way of that one alone.
         let offsets = vec![0.1 * unit; soft.solid.nodes.len()];
-        let mut contact = of(&soft).offsets(&offsets).unwrap().ramp([1.0, 2.0], [0.0, 1.0]).unwrap();
+        let mut contact =
+            of(&soft).with(SurfaceSettings::new().offsets(&offsets).ramp([1.0, 2.0], [0.0, 1.0])).unwrap();
         let way = [0.0, -0.15 * unit];
         assert_eq!(look(&mut contact, &soft, [0.0, 1.0], way, open), None);
         assert!(is(look(&mut contact, &soft, [1.0, 2.0], way, open), "went into"));
@@ -493,7 +496,7 @@ fn found(contact: &mut Mortar<f64>, u: &[f64]) -> Vec<Found> {
 fn a_search_looks_ahead() {
     let stack = Stack::new(plates(3, 4), 0.5, |x| x);
     for (moves, (ahead, rows)) in [0, 1].into_iter().flat_map(|moves| [(0.1, 0), (0.3, 5)].map(|case| (moves, case))) {
-        let mut contact = stack.mortar(true).unwrap().reach(0.3).unwrap();
+        let mut contact = stack.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap();
         let dofs = contact.dofs().to_vec();
         let toward = [1.0, -1.0][moves];
         let is_moving = |dof: usize| dof % 2 == 1 && usize::from(dof >= 2 * stack.split) == moves;
@@ -510,7 +513,8 @@ fn the_reach_is_that_of_surfaces_with_thickness() {
     let offsets = vec![0.15; stack.solid.nodes.len()];
     let still = vec![0.0; stack.solid.dofs()];
     for (reach, rows) in [(0.19, 0), (0.21, 5)] {
-        let mut contact = stack.mortar(true).unwrap().reach(reach).unwrap().offsets(&offsets).unwrap();
+        let mut contact =
+            stack.mortar(true).unwrap().with(SurfaceSettings::new().reach(reach).offsets(&offsets)).unwrap();
         let found = found(&mut contact, &still);
         assert_eq!(found.len(), rows, "{reach}: {found:?}");
         assert!(found.iter().all(|(_, gap, _)| (gap - 0.2).abs() < 1e-13), "{found:?}");
@@ -532,7 +536,8 @@ fn rows_depend_neither_on_units_nor_on_the_order_of_facets() {
     let unit = f64::from(1 << 20);
     let scaled = Stack::new(bodies(), 0.1, |x| x.map(|x| unit * x));
     let larger: Vec<f64> = u.iter().map(|u| unit * u).collect();
-    let in_units = found(&mut scaled.mortar(true).unwrap().reach(0.3 * unit).unwrap(), &larger);
+    let in_units =
+        found(&mut scaled.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.3 * unit)).unwrap(), &larger);
     for ((name, gap, row), (other, large, same)) in rows.iter().zip(&in_units) {
         assert_eq!((name, (unit * gap).to_bits(), row), (other, large.to_bits(), same));
     }
@@ -541,7 +546,10 @@ fn rows_depend_neither_on_units_nor_on_the_order_of_facets() {
     lower.reverse();
     upper.rotate_left(2);
     let Solid { nodes, .. } = &stack.solid;
-    let mut turned = Mortar::new(nodes, &stack.solid.node_dofs(), upper, lower).unwrap().reach(0.3).unwrap();
+    let mut turned = Mortar::new(nodes, &stack.solid.node_dofs(), upper, lower)
+        .unwrap()
+        .with(SurfaceSettings::new().reach(0.3))
+        .unwrap();
     for ((name, gap, row), (other, again, same)) in rows.iter().zip(found(&mut turned, &u)) {
         assert!(*name == other && (gap - again).abs() < 1e-15 && row.len() == same.len(), "{name:?}");
         assert!(row.iter().zip(same).all(|((dof, x), (other, y))| *dof == other && (x - y).abs() < 1e-14));
@@ -553,7 +561,7 @@ fn lists_of_pairs_do_not_change_a_result() {
     // Back and forth over the other body, searching from lists that are old and from new ones.
     let [below, above] = plates(6, 4);
     let stack = Stack::new([below, above], 0.02, |x| x);
-    let mut kept = mortar(&stack, true).skin(0.4).unwrap();
+    let mut kept = mortar(&stack, true).with(SurfaceSettings::new().skin(0.4)).unwrap();
     for step in 0..40 {
         let along = 0.5 * (0.3 * f64::from(step)).sin();
         let shift = |dof: usize| if dof >= 2 * stack.split && dof.is_multiple_of(2) { along } else { 0.0 };
@@ -602,7 +610,7 @@ fn what_cannot_be_a_surface_is_refused() {
     assert!(matches!(build(&[[0, 0]], &[[2, 3]]), Error::InvertedFacet { .. }));
     assert!(matches!(build(&[[0, 4]], &[[2, 3]]), Error::Dimension { .. }));
     let contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[1, 0]]).unwrap();
-    assert!(matches!(contact.reach(-1.0), Err(Error::Parameter { .. })));
+    assert!(matches!(contact.with(SurfaceSettings::new().reach(-1.0)), Err(Error::Parameter { .. })));
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Contact of nodes with facets: meshes, and what is asked of them in all files of this folder.
-#![cfg(feature = "search")]
+#![cfg(feature = "mesh-contact")]
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
 mod following;
@@ -7,7 +7,7 @@ mod gaps;
 mod lists;
 mod rates;
 
-use contact_dynamics::contact::{ContactJacobian, Facet, NodeToFacet};
+use contact_dynamics::contact::{ContactJacobian, Facet, NodeToFacet, SurfaceSettings};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::Congruential;
 
@@ -36,13 +36,19 @@ impl<const D: usize> Mesh<D> {
 
     fn contact(&self, nodes: &[usize], reach: f64) -> NodeToFacet<f64> {
         let facets = self.facets.iter().copied();
-        NodeToFacet::one_pass(&self.coordinates, &self.dofs(), nodes, facets).unwrap().reach(reach).unwrap()
+        NodeToFacet::one_pass(&self.coordinates, &self.dofs(), nodes, facets)
+            .unwrap()
+            .with(SurfaceSettings::new().reach(reach))
+            .unwrap()
     }
 
     /// In two passes.
     fn both(&self, own: impl IntoIterator<Item = Facet>, reach: f64) -> NodeToFacet<f64> {
         let facets = self.facets.iter().copied();
-        NodeToFacet::new(&self.coordinates, &self.dofs(), own, facets).unwrap().reach(reach).unwrap()
+        NodeToFacet::new(&self.coordinates, &self.dofs(), own, facets)
+            .unwrap()
+            .with(SurfaceSettings::new().reach(reach))
+            .unwrap()
     }
 
     fn positions(&self, u: &[f64]) -> Vec<[f64; D]> {

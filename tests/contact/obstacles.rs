@@ -121,7 +121,7 @@ fn curvature_has_the_unit_of_an_inverse_length() {
         let sphere = Sphere::new(center, radius, side).unwrap().curvature(scaled(x), w);
         [sphere, Cylinder::new(center, [1.0, 0.5, 2.0], radius, side).unwrap().curvature(scaled(x), w)]
     };
-    for unit in [1e-200, 1e-3, 1e200] {
+    for unit in [1e-100, 1e-3, 1e100] {
         for (found, expected) in of(unit).into_iter().zip(of(1.0)) {
             assert!((found * unit / expected - 1.0).abs() < 1e-13, "{unit:e}: {found:e} {expected:e}");
         }

@@ -1,7 +1,7 @@
 //! Surfaces that lie outside of their facets: shells, coatings, and press fits whose interference grows or goes.
 
 use contact_dynamics::contact::{
-    BodyContact, ContactConstraint, Contacts, EdgeToEdge, Mortar, NodeToFacet, Stride, Surface,
+    BodyContact, ContactConstraint, Contacts, EdgeToEdge, Mortar, NodeToFacet, Stride, Surface, SurfaceSettings,
 };
 use contact_dynamics::{
     EnergyMomentum, Error, LinearSystem, Newmark, PersistencyCorrection, Simulation, StepControl, verify,
@@ -60,16 +60,26 @@ fn rows_hold_the_slope_of_offsets() {
         let bodies = [[2, 2, 1], [3, 2, 1]].map(|cells| Solid::block([1.0; 3], cells, MATERIAL));
         let solid = Stack::new(bodies, 0.02, |x| x);
         let [few, many] = [flat.solid.nodes.len(), solid.solid.nodes.len()].map(|n| at_random(n, 0.05, seed));
-        let mortar = flat.mortar(true).unwrap().reach(0.4).unwrap().offsets(&few).unwrap();
-        check_rows((&flat.solid, 5), mortar.ramp(ramp.0, ramp.1).unwrap(), (1e-8, seed));
+        let mortar = flat.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.4).offsets(&few)).unwrap();
+        check_rows((&flat.solid, 5), mortar.with(SurfaceSettings::new().ramp(ramp.0, ramp.1)).unwrap(), (1e-8, seed));
         // (Warped facets in space: quadrature.)
-        let mortar = solid.mortar(true).unwrap().reach(0.4).unwrap().offsets(&many).unwrap();
-        check_rows((&solid.solid, 5), mortar.ramp(ramp.0, ramp.1).unwrap(), (1e-3, seed));
+        let mortar = solid.mortar(true).unwrap().with(SurfaceSettings::new().reach(0.4).offsets(&many)).unwrap();
+        check_rows((&solid.solid, 5), mortar.with(SurfaceSettings::new().ramp(ramp.0, ramp.1)).unwrap(), (1e-3, seed));
         for passes in [1, 2] {
-            let nodes = flat.nodes_on_facets(passes).unwrap().reach(0.4).unwrap().offsets(&few).unwrap();
-            check_rows((&flat.solid, 3), nodes.ramp(ramp.0, ramp.1).unwrap(), (1e-8, seed));
-            let nodes = solid.nodes_on_facets(passes).unwrap().reach(0.4).unwrap().offsets(&many).unwrap();
-            check_rows((&solid.solid, 5), nodes.ramp(ramp.0, ramp.1).unwrap(), (1e-8, seed));
+            let nodes =
+                flat.nodes_on_facets(passes).unwrap().with(SurfaceSettings::new().reach(0.4).offsets(&few)).unwrap();
+            check_rows(
+                (&flat.solid, 3),
+                nodes.with(SurfaceSettings::new().ramp(ramp.0, ramp.1)).unwrap(),
+                (1e-8, seed),
+            );
+            let nodes =
+                solid.nodes_on_facets(passes).unwrap().with(SurfaceSettings::new().reach(0.4).offsets(&many)).unwrap();
+            check_rows(
+                (&solid.solid, 5),
+                nodes.with(SurfaceSettings::new().ramp(ramp.0, ramp.1)).unwrap(),
+                (1e-8, seed),
+            );
         }
     }
 }
@@ -104,7 +114,7 @@ fn rows_of_rounded_edges_hold_the_slope_of_their_radii() {
             EdgeToEdge::of_itself(&nodes, &dofs, below.into_iter().chain(above)).unwrap(),
         ];
         for contact in contacts {
-            let contact = contact.offsets(&offsets).unwrap().ramp([-1.0, 1.0], [0.5, 1.5]).unwrap();
+            let contact = contact.with(SurfaceSettings::new().offsets(&offsets).ramp([-1.0, 1.0], [0.5, 1.5])).unwrap();
             check_rows((&solid, 1), contact, (1e-8, seed));
         }
     }
@@ -115,8 +125,11 @@ fn rounded_edges_touch_at_the_sum_of_their_radii() {
     let (nodes, below, above) = ridges();
     let dofs: Vec<[usize; 3]> = (0..8).map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
     let gap = |offsets: &[f64; 8], t: f64| {
-        let contact = EdgeToEdge::new(&nodes, &dofs, above, below).unwrap().offsets(offsets).unwrap();
-        let mut contact = contact.ramp([0.0, 1.0], [0.0, 1.0]).unwrap();
+        let contact = EdgeToEdge::new(&nodes, &dofs, above, below)
+            .unwrap()
+            .with(SurfaceSettings::new().offsets(offsets))
+            .unwrap();
+        let mut contact = contact.with(SurfaceSettings::new().ramp([0.0, 1.0], [0.0, 1.0])).unwrap();
         contact.search(t, &[0.0; 24], &[0.0; 24], 0.0).unwrap();
         let ends = contact.edges().map(<[_]>::to_vec);
         let found = Contacts::of(&contact);
@@ -142,13 +155,16 @@ fn offsets_are_taken_from_the_distance_of_nodes() {
     let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.25, 0.3], [0.75, 0.3]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
     let offsets = [0.06, 0.0, 0.1, 0.02];
-    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2, 3], [[0, 1]]).unwrap().offsets(&offsets).unwrap();
+    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2, 3], [[0, 1]])
+        .unwrap()
+        .with(SurfaceSettings::new().offsets(&offsets))
+        .unwrap();
     let gaps_at = |contact: &mut NodeToFacet<f64>, t: f64| {
         let mut gaps = [0.0_f64; 2];
         contact.gaps(t, &[0.0; 8], &mut gaps).unwrap();
         gaps
     };
-    let mut contact = contact.ramp([2.0, 4.0], [0.0, 1.0]).unwrap();
+    let mut contact = contact.with(SurfaceSettings::new().ramp([2.0, 4.0], [0.0, 1.0])).unwrap();
     contact.search(3.0, &[0.0; 8], &[0.0; 8], 0.0).unwrap();
     // By half, then fully, between two searches.
     for (t, factor) in [(3.0, 0.5), (5.0, 1.0)] {
@@ -169,7 +185,7 @@ fn what_offsets_bring_near_is_found_and_the_thicker_facet_comes_first() {
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9]];
     let contact = |offsets: [f64; 5]| {
         let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[4], [[0, 1], [2, 3]]).unwrap();
-        let mut contact = contact.reach(0.1).unwrap().offsets(&offsets).unwrap();
+        let mut contact = contact.with(SurfaceSettings::new().reach(0.1).offsets(&offsets)).unwrap();
         contact.search(0.0, &[0.0; 10], &[0.0; 10], 0.0).unwrap();
         let gaps = Contacts::of(&contact).len();
         let mut gap = vec![0.0_f64; gaps];
@@ -189,7 +205,7 @@ fn nodes_whose_way_ends_in_a_layer_are_seen() {
     let dofs = [[0, 1], [2, 3], [4, 5]];
     for (end, is_refused) in [(0.5, false), (0.1, true), (-0.5, true), (0.35, false)] {
         let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[2], [[0, 1]]).unwrap();
-        let mut contact = contact.reach(0.01).unwrap().offsets(&[0.2, 0.2, 0.1]).unwrap();
+        let mut contact = contact.with(SurfaceSettings::new().reach(0.01).offsets(&[0.2, 0.2, 0.1])).unwrap();
         let (u, v) = ([0.0; 6], [0.0; 6]);
         contact.search(0.0, &u, &v, 0.0).unwrap();
         assert_eq!(Contacts::of(&contact).len(), 0);
@@ -206,7 +222,10 @@ fn offsets_are_taken_from_the_gap() {
     let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.3], [1.0, 0.3]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
     let offsets = [0.06, 0.0, 0.1, 0.1];
-    let mut contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[0, 1]]).unwrap().offsets(&offsets).unwrap();
+    let mut contact = Mortar::new(&coordinates, &dofs, [[2, 3]], [[0, 1]])
+        .unwrap()
+        .with(SurfaceSettings::new().offsets(&offsets))
+        .unwrap();
     let mut gaps = [0.0_f64; 2];
     contact.search(0.0, &[0.0; 8], &[0.0; 8], 0.0).unwrap();
     contact.gaps(0.0, &[0.0; 8], &mut gaps).unwrap();
@@ -215,7 +234,7 @@ fn offsets_are_taken_from_the_gap() {
         assert!((gap - expected).abs() < 1e-15, "{gaps:?}");
     }
     // Halfway up a ramp they count by half.
-    let mut contact = contact.ramp([2.0, 4.0], [0.0, 1.0]).unwrap();
+    let mut contact = contact.with(SurfaceSettings::new().ramp([2.0, 4.0], [0.0, 1.0])).unwrap();
     contact.search(3.0, &[0.0; 8], &[0.0; 8], 0.0).unwrap();
     contact.gaps(3.0, &[0.0; 8], &mut gaps).unwrap();
     assert!((gaps[0] - 0.24).abs() < 1e-15);
@@ -249,11 +268,17 @@ fn a_press_fit_grows_to_its_pressure() {
         let stack = plates(gap);
         let solid = &stack.solid;
         let (offsets, times, dofs) = (vec![offset; solid.nodes.len()], [0.0, 20.0], solid.node_dofs());
-        let mortar = stack.mortar(true).unwrap().offsets(&offsets).unwrap().ramp(times, factors).unwrap();
-        let nodes = stack.nodes_on_facets(2).unwrap().offsets(&offsets).unwrap().ramp(times, factors).unwrap();
+        let mortar =
+            stack.mortar(true).unwrap().with(SurfaceSettings::new().offsets(&offsets).ramp(times, factors)).unwrap();
+        let nodes = stack
+            .nodes_on_facets(2)
+            .unwrap()
+            .with(SurfaceSettings::new().offsets(&offsets).ramp(times, factors))
+            .unwrap();
         let surface = Surface::of_cells(&solid.nodes, &solid.elements).unwrap();
-        let own = BodyContact::of_itself(&solid.nodes, &dofs, &surface).unwrap().reach(0.3);
-        let own = own.offsets(&offsets).unwrap().ramp(times, factors).unwrap().constraints().unwrap();
+        let own = BodyContact::of_itself(&solid.nodes, &dofs, &surface).unwrap();
+        let settings = SurfaceSettings::new().reach(0.3).offsets(&offsets).ramp(times, factors);
+        let own = own.with(settings).unwrap().constraints().unwrap();
         let constraints: [Vec<Box<dyn ContactConstraint<f64>>>; 3] =
             [vec![Box::new(mortar)], vec![Box::new(nodes)], own];
         for (kind, constraints) in constraints.into_iter().enumerate() {
@@ -278,7 +303,10 @@ fn a_strip_rests_on_another_at_half_of_both_thicknesses() {
         coordinates.iter().enumerate().map(|(k, x)| if k < LOWER { below(x[0]) } else { 0.02 * k as f64 }).collect();
     let nodes: Vec<usize> = (LOWER..coordinates.len()).collect();
     let facets = (1..LOWER).map(|k| [k - 1, k]);
-    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &nodes, facets).unwrap().offsets(&offsets).unwrap();
+    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &nodes, facets)
+        .unwrap()
+        .with(SurfaceSettings::new().offsets(&offsets))
+        .unwrap();
     let free = contact_dynamics::faer::sparse::SparseColMat::try_new_from_triplets(18, 18, &[]).unwrap();
     let mut system = LinearSystem::lumped(vec![1.0; 18], free).unwrap();
     system = system.load(|_, f| (LOWER..9).for_each(|node| f[2 * node + 1] = -1.0));
@@ -303,7 +331,7 @@ fn coated_arms_of_a_hairpin_meet_at_twice_their_coating() {
     let Folding { solid: pin, velocity, .. } = Folding::hairpin(0.2, 3.0);
     let surface = Surface::of_cells(&pin.nodes, &pin.elements).unwrap();
     let own = || NodeToFacet::of_itself(&pin.nodes, &pin.node_dofs(), &surface).unwrap();
-    let coated = own().offsets(&vec![0.03; pin.nodes.len()]).unwrap();
+    let coated = own().with(SurfaceSettings::new().offsets(&vec![0.03; pin.nodes.len()])).unwrap();
     let mut run = Simulation::builder(Hyperelastic::new(&pin, Law::NeoHookean), EnergyMomentum, 5e-3)
         .velocity(velocity)
         .constraint(coated)
@@ -335,7 +363,9 @@ fn patches_with_offsets_that_cancel_are_those_without() {
         let offsets: Vec<f64> =
             (0..stack.solid.nodes.len()).map(|node| if node < stack.split { -0.05 } else { 0.05 }).collect();
         let plain = stack.patch(stack.nodes_on_facets(passes).unwrap()).unwrap();
-        let offset = stack.patch(stack.nodes_on_facets(passes).unwrap().offsets(&offsets).unwrap()).unwrap();
+        let offset = stack
+            .patch(stack.nodes_on_facets(passes).unwrap().with(SurfaceSettings::new().offsets(&offsets)).unwrap())
+            .unwrap();
         assert!(plain < 1e-11 && offset < 1e-11, "{passes} {cells:?}: {plain:e} {offset:e}");
     }
 }
@@ -351,7 +381,8 @@ fn offsets_do_not_depend_on_units() {
         let nodes: Vec<[f64; 2]> = solid.nodes.iter().map(|x| x.map(|x| unit * x)).collect();
         let [lower, upper] = stack.surfaces();
         let contact = NodeToFacet::new(&nodes, &solid.node_dofs(), upper, lower).unwrap();
-        let mut contact = contact.offsets(&scaled(&offsets)).unwrap().ramp([0.0, 1.0], [0.0, 1.0]).unwrap();
+        let mut contact =
+            contact.with(SurfaceSettings::new().offsets(&scaled(&offsets)).ramp([0.0, 1.0], [0.0, 1.0])).unwrap();
         let u = scaled(&u);
         let v = vec![0.0; u.len()];
         contact.search_on(0.7, &u, &v, 0.0).unwrap();
@@ -373,7 +404,8 @@ fn all_parts_of_two_bodies_take_offsets() {
     let bodies = [3, 2].map(|n| Solid::block([1.0; 3], [n, n, 1], MATERIAL));
     let stack = Stack::of_whole_surfaces([bodies[0].clone(), bodies[1].clone().moved([0.0, 0.0, 1.1])]);
     let offsets = vec![0.05; stack.solid.nodes.len()];
-    let constraints = stack.bodies(true).unwrap().offsets(&offsets).unwrap().constraints().unwrap();
+    let constraints =
+        stack.bodies(true).unwrap().with(SurfaceSettings::new().offsets(&offsets)).unwrap().constraints().unwrap();
     assert_eq!(constraints.len(), 4);
     for mut contact in constraints {
         let zeros = vec![0.0; contact.dofs().len()];
@@ -383,8 +415,14 @@ fn all_parts_of_two_bodies_take_offsets() {
         let least = gaps.iter().fold(f64::INFINITY, |least, gap| least.min(*gap));
         assert!(gaps.is_empty() || least.abs() < 1e-12, "{gaps:?}");
     }
-    assert!(matches!(stack.bodies(true).unwrap().offsets(&[0.1]), Err(Error::Dimension { .. })));
-    assert!(matches!(stack.bodies(true).unwrap().ramp([1.0, 0.0], [0.0, 1.0]), Err(Error::Parameter { .. })));
+    assert!(matches!(
+        stack.bodies(true).unwrap().with(SurfaceSettings::new().offsets(&[0.1])),
+        Err(Error::Dimension { .. })
+    ));
+    assert!(matches!(
+        stack.bodies(true).unwrap().with(SurfaceSettings::new().ramp([1.0, 0.0], [0.0, 1.0])),
+        Err(Error::Parameter { .. })
+    ));
 }
 
 #[test]
@@ -392,16 +430,25 @@ fn offsets_that_are_none_are_refused() {
     let stack = plates(0.0);
     let contact = || stack.mortar(true).unwrap();
     let count = stack.solid.nodes.len();
-    assert!(matches!(contact().offsets(&[0.1]), Err(Error::Dimension { found: 1, .. })));
+    assert!(matches!(contact().with(SurfaceSettings::new().offsets(&[0.1])), Err(Error::Dimension { found: 1, .. })));
     let mut offsets = vec![0.0; count];
-    assert!(matches!(stack.nodes_on_facets(1).unwrap().offsets(&[0.1]), Err(Error::Dimension { found: 1, .. })));
+    assert!(matches!(
+        stack.nodes_on_facets(1).unwrap().with(SurfaceSettings::new().offsets(&[0.1])),
+        Err(Error::Dimension { found: 1, .. })
+    ));
     offsets[4] = f64::NAN;
-    assert!(matches!(stack.nodes_on_facets(1).unwrap().offsets(&offsets), Err(Error::NotFinite { index: 4, .. })));
-    assert!(matches!(contact().offsets(&offsets), Err(Error::NotFinite { index: 4, .. })));
+    assert!(matches!(
+        stack.nodes_on_facets(1).unwrap().with(SurfaceSettings::new().offsets(&offsets)),
+        Err(Error::NotFinite { index: 4, .. })
+    ));
+    assert!(matches!(contact().with(SurfaceSettings::new().offsets(&offsets)), Err(Error::NotFinite { index: 4, .. })));
     for (times, factors) in
         [([1.0, 1.0], [0.0, 1.0]), ([0.0, f64::INFINITY], [0.0, 1.0]), ([0.0, 1.0], [f64::NAN, 1.0])]
     {
-        assert!(matches!(contact().ramp(times, factors), Err(Error::Parameter { .. })));
-        assert!(matches!(stack.nodes_on_facets(2).unwrap().ramp(times, factors), Err(Error::Parameter { .. })));
+        assert!(matches!(contact().with(SurfaceSettings::new().ramp(times, factors)), Err(Error::Parameter { .. })));
+        assert!(matches!(
+            stack.nodes_on_facets(2).unwrap().with(SurfaceSettings::new().ramp(times, factors)),
+            Err(Error::Parameter { .. })
+        ));
     }
 }

@@ -2,7 +2,7 @@
 //! passes.
 #![allow(clippy::float_cmp)] // unchanged values are meant exactly
 
-use contact_dynamics::contact::{Cylinder, Obstacle, Plane, Side, Sphere};
+use contact_dynamics::contact::{Cylinder, Obstacle, Plane, Side, Sphere, SurfaceSettings};
 use contact_dynamics::{
     ContactConstraint, ContactLaw, Error, LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
     StepControl,
@@ -275,7 +275,7 @@ fn compliant_contacts_may_be_deep() {
     assert!((v.iter().map(|v| v * v).sum::<f64>() - 1.0).abs() < 0.02 && v[0] < -0.8, "{v:?}");
 }
 
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 mod facets {
     use super::*;
     use contact_dynamics::contact::{Contacts, Facet, NodeToFacet, Stride};
@@ -351,7 +351,10 @@ mod facets {
                     let edge = meeting.map_or(f64::INFINITY, near);
                     let (nodes, facets) = body(start, size, triangles);
                     let dofs: Vec<[usize; D]> = (0..nodes.len()).map(|n| std::array::from_fn(|k| D * n + k)).collect();
-                    let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets).unwrap().reach(reach).unwrap();
+                    let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets)
+                        .unwrap()
+                        .with(SurfaceSettings::new().reach(reach))
+                        .unwrap();
                     let what = format!("{name}, way {ratio:.2}, {aim}, {phase}, slope {slope}, {steps:?}");
                     let duration = 2.0 * (0.7_f64 + phase).max(0.3 / ratio) + 3.0 / (ratio * reach);
                     let held = dofs.len() * D - D;
@@ -373,7 +376,7 @@ mod facets {
         let (nodes, facets) = body(start.map(|x| unit * x), [unit; 2], false);
         let dofs: Vec<[usize; 2]> = (0..nodes.len()).map(|n| [2 * n, 2 * n + 1]).collect();
         let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], facets).unwrap();
-        let mut contact = contact.reach(0.3 * unit).unwrap().with_law(law);
+        let mut contact = contact.with(SurfaceSettings::new().reach(0.3 * unit)).unwrap().with_law(law);
         let own: Vec<usize> = contact.dofs().to_vec();
         let still = vec![0.0; own.len()];
         let end: Vec<f64> = own.iter().map(|&dof| if dof < 2 { unit * way[dof] } else { 0.0 }).collect();
@@ -424,7 +427,7 @@ mod facets {
             let nodes = [[x, y, 0.2], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
             let dofs: Vec<[usize; 3]> = (0..4).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
             let contact = NodeToFacet::one_pass(&nodes, &dofs, &[0], [[1, 2, 3]]).unwrap();
-            let mut contact = contact.reach(0.1).unwrap();
+            let mut contact = contact.with(SurfaceSettings::new().reach(0.1)).unwrap();
             let own: Vec<usize> = contact.dofs().to_vec();
             let still = vec![0.0; own.len()];
             let end: Vec<f64> = own.iter().map(|&dof| if dof == 2 { -1.2 } else { 0.0 }).collect();

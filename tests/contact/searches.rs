@@ -1,8 +1,8 @@
 //! Searches that keep lists: whatever came before, a search finds what a constraint finds that is new.
-#![cfg(feature = "search")]
+#![cfg(feature = "mesh-contact")]
 
 use super::mortar::shaken;
-use contact_dynamics::contact::{ContactConstraint, Contacts, GapRates, Mortar, NodeToFacet, Surface};
+use contact_dynamics::contact::{ContactConstraint, Contacts, GapRates, Mortar, NodeToFacet, Surface, SurfaceSettings};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
 
@@ -113,13 +113,15 @@ fn a_search_finds_what_a_new_one_finds() {
     let makes: [(&str, &dyn Fn() -> Made); 7] = [
         ("one pass", &|| Box::new(stack.nodes_on_facets(1).unwrap())),
         ("two passes", &|| Box::new(both())),
-        ("a thin skin", &|| Box::new(both().skin(0.05).unwrap())),
-        ("offsets", &|| Box::new(both().offsets(&offsets).unwrap().ramp([0.0, 1.0], [0.5, 2.0]).unwrap())),
+        ("a thin skin", &|| Box::new(both().with(SurfaceSettings::new().skin(0.05)).unwrap())),
+        ("offsets", &|| {
+            Box::new(both().with(SurfaceSettings::new().offsets(&offsets).ramp([0.0, 1.0], [0.5, 2.0])).unwrap())
+        }),
         ("of itself", &|| Box::new(NodeToFacet::of_itself(nodes, &dofs, &whole).unwrap())),
         ("mortar", &|| Box::new(stack.mortar(true).unwrap().friction(0.2))),
         ("dual, with offsets", &|| {
             let contact = Mortar::new(nodes, &dofs, upper.clone(), lower.clone()).unwrap().dual().unwrap();
-            Box::new(contact.offsets(&offsets).unwrap().ramp([0.0, 1.0], [0.5, 2.0]).unwrap())
+            Box::new(contact.with(SurfaceSettings::new().offsets(&offsets).ramp([0.0, 1.0], [0.5, 2.0])).unwrap())
         }),
     ];
     for (name, make) in makes {

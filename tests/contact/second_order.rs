@@ -1,7 +1,7 @@
 //! Facets of second order: patch tests, derivatives, momentum, curved surfaces, ties.
 
 use super::mortar::{blocks, shaken};
-use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Mortar, Surface, Tie};
+use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Mortar, Surface, SurfaceSettings, Tie};
 use contact_dynamics::{Composite, Error, Simulation, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::xorshift;
@@ -17,7 +17,7 @@ fn plates(lower: usize, upper: usize) -> [Solid<2>; 2] {
 
 /// With a reach of less than the bodies.
 fn mortar<const D: usize>(stack: &SecondOrderStack<D>, upper: bool) -> Mortar<f64> {
-    stack.mortar(upper).unwrap().reach(0.3).unwrap()
+    stack.mortar(upper).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap()
 }
 
 #[test]

@@ -141,7 +141,7 @@ fn check_slips<const D: usize>(
     }
 }
 
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 #[test]
 fn gaps_of_all_shapes_that_turn_have_the_rates_of_their_differences() {
     use contact_dynamics_scenes::obstacles::{in_plane, in_space};
@@ -173,7 +173,7 @@ fn gaps_of_all_shapes_that_turn_have_the_rates_of_their_differences() {
 }
 
 /// Rows that followed are those of a search, to the last bit.
-#[cfg(feature = "search")]
+#[cfg(feature = "mesh-contact")]
 #[test]
 fn followed_rows_of_all_shapes_that_turn_are_those_of_a_search() {
     use contact_dynamics_scenes::obstacles::in_space;

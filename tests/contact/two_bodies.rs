@@ -1,6 +1,6 @@
 //! Two deformable bodies in contact through node to facet: patch test, impacts of blocks and rings, one pass and two.
 
-use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodeToFacet};
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodeToFacet, SurfaceSettings};
 use contact_dynamics::{
     Composite, Corrector, EnergyMomentum, Newmark, PersistencyCorrection, Simulation, StepControl, TimeIntegrator,
     verify,
@@ -39,7 +39,7 @@ fn blocks(lower: [usize; 3], upper: [usize; 3], gap: f64) -> Stack<3> {
 
 /// Nodes of the upper block on facets of the lower one.
 fn nodes_on_facets(stack: &Stack<3>, passes: usize) -> NodeToFacet<f64> {
-    stack.nodes_on_facets(passes).unwrap().reach(0.3).unwrap()
+    stack.nodes_on_facets(passes).unwrap().with(SurfaceSettings::new().reach(0.3)).unwrap()
 }
 
 /// Two blocks under uniform pressure, supported so that the exact solution is uniaxial: largest deviation of the
@@ -191,13 +191,19 @@ impl Rings {
 
     fn contact(&self) -> NodeToFacet<f64> {
         let Self { solid, nodes, facets, .. } = self;
-        NodeToFacet::one_pass(&solid.nodes, &solid.node_dofs(), nodes, facets[0].clone()).unwrap().reach(5.0).unwrap()
+        NodeToFacet::one_pass(&solid.nodes, &solid.node_dofs(), nodes, facets[0].clone())
+            .unwrap()
+            .with(SurfaceSettings::new().reach(5.0))
+            .unwrap()
     }
 
     /// In two passes.
     fn both(&self) -> NodeToFacet<f64> {
         let [one, other] = self.facets.clone();
-        NodeToFacet::new(&self.solid.nodes, &self.solid.node_dofs(), other, one).unwrap().reach(5.0).unwrap()
+        NodeToFacet::new(&self.solid.nodes, &self.solid.node_dofs(), other, one)
+            .unwrap()
+            .with(SurfaceSettings::new().reach(5.0))
+            .unwrap()
     }
 
     /// Each at `speed` toward the other.
@@ -343,7 +349,7 @@ impl Fall {
                 .and_then(|contact| contact.facing(quads(&above))),
             _ => NodeToFacet::new(&solid.nodes, &solid.node_dofs(), quads(&above), quads(&below)),
         };
-        let contact = contact.unwrap().reach(0.2).unwrap();
+        let contact = contact.unwrap().with(SurfaceSettings::new().reach(0.2)).unwrap();
         let falls = |dof: usize| dof % 3 == 2 && dof >= 3 * split;
         let velocity = (0..solid.dofs()).map(|dof| if falls(dof) { -speed } else { 0.0 }).collect();
         Self { solid, contact: contact.with_law(law), velocity, crossing: 1.0 / 3.0 / material.wave_speed() }

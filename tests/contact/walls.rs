@@ -1,7 +1,7 @@
 //! Thin and hollow bodies: facets are met from outside, not through the material of the bodies, however far a
 //! constraint looks.
 
-use contact_dynamics::contact::{BodyContact, ContactConstraint, Contacts, NodeToFacet, Surface};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, Contacts, NodeToFacet, Surface, SurfaceSettings};
 use contact_dynamics::{PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::schemes::{self, Listed};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -13,8 +13,10 @@ type Constraints = Vec<Box<dyn ContactConstraint<f64>>>;
 fn of_itself<const D: usize>(solid: &Solid<D>, reach: f64) -> [(&'static str, Constraints); 2] {
     let (nodes, dofs) = (&solid.nodes, solid.node_dofs());
     let surface = Surface::of_cells(nodes, &solid.elements).unwrap();
-    let facets = NodeToFacet::of_itself(nodes, &dofs, &surface).unwrap().reach(reach).unwrap();
-    let bodies = BodyContact::of_itself(nodes, &dofs, &surface).unwrap().reach(reach);
+    let facets =
+        NodeToFacet::of_itself(nodes, &dofs, &surface).unwrap().with(SurfaceSettings::new().reach(reach)).unwrap();
+    let bodies =
+        BodyContact::of_itself(nodes, &dofs, &surface).unwrap().with(SurfaceSettings::new().reach(reach)).unwrap();
     [("nodes of itself", vec![Box::new(facets)]), ("bodies of itself", bodies.constraints().unwrap())]
 }
 
@@ -24,8 +26,10 @@ fn between<const D: usize>([one, other]: [Solid<D>; 2], reach: f64) -> [(&'stati
     let (nodes, dofs) = (&pair.nodes, pair.node_dofs());
     let [one, other] =
         [&pair.elements[..first], &pair.elements[first..]].map(|cells| Surface::of_cells(nodes, cells).unwrap());
-    let facets = NodeToFacet::new(nodes, &dofs, &one, &other).unwrap().reach(reach).unwrap();
-    let bodies = BodyContact::new(nodes, &dofs, &one, &other).unwrap().reach(reach);
+    let facets =
+        NodeToFacet::new(nodes, &dofs, &one, &other).unwrap().with(SurfaceSettings::new().reach(reach)).unwrap();
+    let bodies =
+        BodyContact::new(nodes, &dofs, &one, &other).unwrap().with(SurfaceSettings::new().reach(reach)).unwrap();
     let [nodes, body] = of_itself(&pair, reach);
     [("nodes", vec![Box::new(facets)]), ("bodies", bodies.constraints().unwrap()), nodes, body]
 }

@@ -1,7 +1,7 @@
 //! Elastic bodies with friction: on an incline, and on each other.
 
 use super::GRAVITY;
-use contact_dynamics::contact::{Contacts, NodeToFacet, NodesOnObstacle, Plane};
+use contact_dynamics::contact::{Contacts, NodeToFacet, NodesOnObstacle, Plane, SurfaceSettings};
 use contact_dynamics::{
     Bathe, Composite, ContactConstraint, ContactStatus, GeneralizedAlpha, LinearSystem, Newmark, Preset, Simulation,
     TimeIntegrator, mass,
@@ -164,7 +164,7 @@ fn friction_of_contacts_that_are_found_later_is_booked() {
     }
     let mut run = Simulation::builder(system, GeneralizedAlpha::chung_hulbert(0.8).unwrap(), 1e-3)
         .velocity((0..solid.dofs()).map(|dof| if dof >= 2 * split { speed(dof) } else { 0.0 }).collect())
-        .constraint(contact.reach(1e-4).unwrap())
+        .constraint(contact.with(SurfaceSettings::new().reach(1e-4)).unwrap())
         .energy_balance()
         .build()
         .unwrap();

@@ -1,6 +1,8 @@
 //! Tangents of every constraint with friction are orthonormal, and what is wrong with those of a host is said.
 
-use contact_dynamics::contact::{ContactConstraint, Contacts, NodeToFacet, NodesOnObstacle, Plane, Side, Sphere};
+use contact_dynamics::contact::{
+    ContactConstraint, Contacts, NodeToFacet, NodesOnObstacle, Plane, Side, Sphere, SurfaceSettings,
+};
 use contact_dynamics::{ContactLaw, LinearRows, verify};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
@@ -39,7 +41,11 @@ fn tangents_in_the_plane_are_the_normal_turned() {
     let on_line = NodesOnObstacle::new(line, &[[1.0, 1.0]], &[[0, 1]], &[0]).unwrap().friction(0.3);
     let pair = LinearRows::new().pair_with_friction((ContactLaw::Rigid, 0.3), [0, 1], [2, 3], [0.6, 0.8], 0.1).unwrap();
     let (nodes, dofs) = ([[0.2, 1.0], [-1.0, 0.0], [1.0, 0.3]], [[0, 1], [2, 3], [4, 5]]);
-    let on_facet = NodeToFacet::one_pass(&nodes, &dofs, &[0], [[1, 2]]).unwrap().reach(2.0).unwrap().friction(0.3);
+    let on_facet = NodeToFacet::one_pass(&nodes, &dofs, &[0], [[1, 2]])
+        .unwrap()
+        .with(SurfaceSettings::new().reach(2.0))
+        .unwrap()
+        .friction(0.3);
     let constraints: [Box<dyn ContactConstraint<f64>>; 3] = [Box::new(on_line), Box::new(pair), Box::new(on_facet)];
     for mut constraint in constraints {
         let zero = vec![0.0; constraint.dofs().len()];

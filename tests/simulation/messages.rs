@@ -1,6 +1,6 @@
 //! What errors and states say: a host's own words with the step, a mass that is too short, facets that are inverted,
 //! and what contact forces and impulses are.
-#![cfg(feature = "search")]
+#![cfg(feature = "mesh-contact")]
 
 use contact_dynamics::contact::{ContactId, Facet, NodeToFacet};
 use contact_dynamics::contact_solver::ContactFailure;

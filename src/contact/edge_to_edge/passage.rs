@@ -4,22 +4,16 @@ use super::EdgeToEdge;
 use super::lines::{Crossing, Ways};
 use super::pairs::{Pair, motion};
 use crate::contact::surface::{Bounds, Point, add_scaled, dot, norm, sub};
-use crate::contact::{LARGEST_MISS, Stride, press_differently};
+use crate::contact::{COARSE, FINE, LARGEST_MISS, Stride, impacts_differ, kept_depth};
 use crate::error::Result;
 use crate::real::Real;
 
-/// Relative motion, as a share of the smallest edge, up to which edges are not checked.
-const FINE: f64 = 0.125;
-
-/// The same limit for the check of the normal along which edges were stopped.
-const COARSE: f64 = 0.6;
-
 /// Number of depths that are checked between two meetings of the lines.
-const LOOKS: u32 = 4;
+const CHECKS: u32 = 4;
 
 impl<T: Real> EdgeToEdge<T> {
     /// Rejects a step in which two edges went through each other, or were stopped apart.
-    pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
+    pub(super) fn check_step(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let motions = self.nodes.boxes_of(|node| self.nodes.way(node, step.u));
         let longest = motions[0].farthest(&motions[1]);
         if self.edges.iter().any(Vec::is_empty) || longest <= FINE * self.finest {
@@ -29,16 +23,16 @@ impl<T: Real> EdgeToEdge<T> {
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        let result = self.look_along(step, longest, &ends);
+        let result = self.check_paths(step, longest, &ends);
         self.ends = ends;
         result
     }
 
-    fn look_along(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
+    fn check_paths(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
         for (row, &index) in self.rows.pairs.iter().enumerate() {
-            if let Err((what, way, gap)) = self.look_at_row(row, step, index, (&start, &end)) {
-                return Err(step.refuse((index[0], index[1]), what, way, gap));
+            if let Err((what, path, gap)) = self.check_row(row, step, index, (&start, &end)) {
+                return Err(step.rejected((index[0], index[1]), what, path, gap));
             }
         }
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
@@ -55,12 +49,12 @@ impl<T: Real> EdgeToEdge<T> {
                 let index = [first, list.map_or(k, |list| list[k])];
                 let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
                 // Edges stopped by a spring penetrate.
-                let springs = self.law.is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
+                let springs = self.settings.given_law().is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
                 if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
                     continue;
                 }
-                if let Err((what, way, gap)) = self.look_at_way(&pair, (&start, &end)) {
-                    return Err(step.refuse((index[0], index[1]), what, way, gap));
+                if let Err((what, path, gap)) = self.check_path(&pair, (&start, &end)) {
+                    return Err(step.rejected((index[0], index[1]), what, path, gap));
                 }
             }
         }
@@ -68,7 +62,7 @@ impl<T: Real> EdgeToEdge<T> {
     }
 
     /// Checks the position and normal at which a row has stopped its edges; returns the reason for a rejection.
-    fn look_at_row(
+    fn check_row(
         &self,
         row: usize,
         step: &Stride<'_, T>,
@@ -87,28 +81,28 @@ impl<T: Real> EdgeToEdge<T> {
         let [from, to] = [from, to].map(|crossing| crossing.as_seen_along(normal));
         let gap = pair_before.clear(&from);
         let by = [0, 1].map(|k| [0, 1].map(|j| sub(after[k][j], before[k][j])));
-        let way = norm(motion(by, to.shares));
-        if way <= FINE * self.finest {
+        let path = norm(motion(by, to.shares));
+        if path <= FINE * self.finest {
             return Ok(());
         }
         if !pair.is_about(&to, end) {
-            return Err(("was stopped where the edges do not meet", way, gap));
+            return Err(("was stopped where the edges do not meet", path, gap));
         }
         // A deep penetration is kept, see `recovery`.
-        let kept = self.law.kept_depth(gap, pair_before.recovery());
-        if (pair.clear(&to) + kept).abs() > LARGEST_MISS * way {
-            return Err(("was stopped away from the other edge", way, gap));
+        let kept = kept_depth(gap, self.settings.given_law().recovery(pair_before.recovery()));
+        if (pair.clear(&to) + kept).abs() > LARGEST_MISS * path {
+            return Err(("was stopped away from the other edge", path, gap));
         }
         let speed = motion(pair.ends(&|node| self.nodes.vector(node, step.v)), from.shares);
         let speeds = [from.normal, to.normal].map(|normal| dot(normal, speed));
-        if way > COARSE * self.finest && press_differently(speeds, dot(speed, speed)) {
-            return Err(("was stopped along a normal that is not the one where the edges met", way, gap));
+        if path > COARSE * self.finest && impacts_differ(speeds, dot(speed, speed)) {
+            return Err(("was stopped along a normal that is not the one where the edges met", path, gap));
         }
         Ok(())
     }
 
     /// Checks whether the edges have penetrated each other along their paths; returns the reason for a rejection.
-    fn look_at_way(
+    fn check_path(
         &self,
         pair: &Pair<'_>,
         (start, end): (&impl Fn(usize) -> Point, &impl Fn(usize) -> Point),
@@ -121,19 +115,19 @@ impl<T: Real> EdgeToEdge<T> {
             let then = |node: usize| add_scaled(start(node), share, sub(end(node), start(node)));
             let Some(entry) = pair.meeting(&then) else { continue };
             let along = motion(by, entry.shares);
-            let way = norm(along);
-            if dot(entry.normal, along) >= 0.0 || way <= FINE * self.finest {
+            let path = norm(along);
+            if dot(entry.normal, along) >= 0.0 || path <= FINE * self.finest {
                 continue;
             }
             let last = ways.meetings().find(|&next| next > share).unwrap_or(1.0);
-            let depth = (1..=LOOKS).filter_map(|look| {
-                let later = share + (last - share) * f64::from(look) / f64::from(LOOKS);
+            let depth = (1..=CHECKS).filter_map(|check| {
+                let later = share + (last - share) * f64::from(check) / f64::from(CHECKS);
                 let crossing = Crossing::of(ways.at(later))?.as_seen_along(entry.normal);
                 crossing.excess().iter().all(|&excess| excess == 0.0).then_some(-crossing.gap)
             });
-            if depth.fold(0.0, f64::max) > LARGEST_MISS * way {
+            if depth.fold(0.0, f64::max) > LARGEST_MISS * path {
                 let gap = Crossing::of(before).map_or(0.0, |start| start.as_seen_along(entry.normal).gap);
-                return Err(("went through another edge", way, gap));
+                return Err(("went through another edge", path, gap));
             }
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! Slave nodes that are bonded to the master until their force is too large.
 
+use crate::contact::affine_rows::SearchState;
 use crate::contact::surface::{Nodes, Surface};
 use crate::contact::{BondStrength, Candidates, ContactConstraint, Tie};
 use crate::error::Result;
@@ -47,7 +48,8 @@ impl<T: Real> Bonds<T> {
     }
 
     /// Lists the rows of the bonded nodes, and linearizes them at u; returns whether they have changed.
-    pub(super) fn search(&mut self, slave: &Surface, (t, u, v): (f64, &[T], &[T]), ahead: f64) -> Result<Candidates> {
+    pub(super) fn search(&mut self, slave: &Surface, state: &SearchState<'_, T>) -> Result<Candidates> {
+        let &SearchState { t, u, v, ahead } = state;
         let Self { tie, holds, changed, .. } = self;
         let relisted = std::mem::take(changed);
         if relisted {

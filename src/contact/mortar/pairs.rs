@@ -33,7 +33,7 @@ impl Pairs {
     pub(super) fn take_near(
         &mut self,
         [slave, master]: [&Surface; 2],
-        [own, other]: &[Material; 2],
+        [own, other]: [&Material; 2],
         positions: &[Point],
         (range, depth): (f64, f64),
     ) -> bool {

@@ -16,9 +16,10 @@ impl<T: Real> Mortar<T> {
     /// ∂g/∂t, from the offsets, and Ġ v + ∂ġ/∂t by differences of integrals. A node that becomes uncovered along the
     /// motion keeps its row: its Ġ v + ∂ġ/∂t is zero.
     pub(super) fn rates_along(&mut self, (t, u, v): (f64, &[T], &[T]), out: &mut [GapRates<T>]) {
-        let Self { nodes, slave, master, thickness, pairs, rows, rates, ahead, multiplier, integrals: known, .. } =
-            self;
-        let Rates { integrals, differences } = rates;
+        let Self { nodes, surfaces, vicinity, pairs, rows, work, multiplier, integrals: known, .. } = self;
+        let (surfaces, ahead) = (surfaces.each_ref(), work.ahead);
+        let Rates { integrals, differences } = &mut work.rates;
+        let thickness = &vicinity.thickness;
         let change = thickness.ramp.rate(t);
         for (out, spot) in out.iter_mut().zip(&rows.spots) {
             out.rate = T::of(-change * spot.offset);
@@ -31,13 +32,19 @@ impl<T: Real> Mortar<T> {
             let is_known = time.to_bits() == t.to_bits() && all().all(is_there);
             if !is_known {
                 let offsets = thickness.at(time);
-                integrals.sum([&*slave, &*master], positions, offsets, *multiplier, pairs);
+                integrals.sum(surfaces, positions, offsets, *multiplier, pairs);
             }
             let sums = if is_known { &known.sums } else { &integrals.sums };
             list.extend(rows.places.iter().map(|&place| sums[place].gap_if_covered()));
         };
-        differences.find(nodes, (t, u, v), (*ahead, slave.finest().min(master.finest())), gaps, |row, acceleration| {
-            out[row].acceleration = T::of(acceleration);
-        });
+        differences.find(
+            nodes,
+            (t, u, v),
+            (ahead, surfaces[0].finest().min(surfaces[1].finest())),
+            gaps,
+            |row, acceleration| {
+                out[row].acceleration = T::of(acceleration);
+            },
+        );
     }
 }

@@ -2,10 +2,12 @@
 
 use super::rows::Rows;
 use super::{NodeToFacet, Pass};
-use crate::contact::ContactId;
+use crate::contact::affine_rows::SearchState;
 use crate::contact::surface::{Bounds, Ground, Kept, Offsets, Point, Stand, Surface, Vicinity};
+use crate::contact::{ContactId, OPEN};
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::half_digits;
 
 impl<T: Real> NodeToFacet<T> {
     /// Finds the boxes of all facets, and makes the lists of facets valid for the current positions and for closest
@@ -28,26 +30,21 @@ impl<T: Real> NodeToFacet<T> {
         self.rebuilds += 1;
     }
 
-    /// The rows of one pass at t, in the order of its nodes. `near` is the box of the other body, widened by the
-    /// search range, and `speeds` are the boxes of the velocities of both bodies. They count for the time `ahead`.
-    pub(super) fn find_rows(
-        &mut self,
-        pass: usize,
-        near: &Bounds,
-        (t, u, v): (f64, &[T], &[T]),
-        (speeds, ahead): (&[Bounds; 2], f64),
-    ) {
+    /// The rows of one pass, in the order of its nodes. `near` is the box of the other body, widened by the search
+    /// range, and `speeds` are the boxes of the velocities of both bodies.
+    pub(super) fn find_rows(&mut self, pass: usize, near: &Bounds, speeds: &[Bounds; 2], state: &SearchState<'_, T>) {
         let mut clearance = std::mem::take(&mut self.passes[pass].clearance);
-        self.find_rows_and(pass, near, (t, u, v), (speeds, ahead), &mut clearance);
+        self.find_rows_and(pass, near, speeds, state, &mut clearance);
         self.passes[pass].clearance = clearance;
     }
 
+    /// As `find_rows`; also writes a lower bound of the distance of each node from the surface.
     fn find_rows_and(
         &mut self,
         pass: usize,
         near: &Bounds,
-        (t, u, v): (f64, &[T], &[T]),
-        (speeds, ahead): (&[Bounds; 2], f64),
+        speeds: &[Bounds; 2],
+        &SearchState { t, u, v, ahead }: &SearchState<'_, T>,
         clearance: &mut [f64],
     ) {
         let Self { surface, own_surface, nodes, passes, vicinity, found, cones, .. } = self;
@@ -60,7 +57,7 @@ impl<T: Real> NodeToFacet<T> {
         let motions = reach.motions(nodes);
         let ground_of = |pass: usize| {
             let kept = Kept { reach, motion: motions[1 - pass], thick };
-            let ground = ground((pass, passes), surfaces, vicinity, places, kept, Self::rounding())?;
+            let ground = ground((pass, passes), surfaces, vicinity, places, kept, half_digits::<T>().value())?;
             let of = |other: usize| if kin.is_some() { Some(&cones[0]) } else { cones.get(other) };
             Some(Ground { boxes: Some(&passes[pass].boxes), cones: [of(pass), of(1 - pass)], ..ground })
         };
@@ -108,8 +105,6 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Linearizes the existing rows at the current positions of their nodes.
     pub(super) fn move_rows(&mut self, t: f64, u: &[T]) -> Result<()> {
-        /// Gap, as a share of the reach, above which a row surely does not press.
-        const OPEN: f64 = 0.01;
         let Self { surface, own_surface, nodes, passes, vicinity, rows, found, .. } = self;
         let Vicinity { reach, thickness, .. } = &*vicinity;
         let motions = reach.motions(nodes);
@@ -124,7 +119,7 @@ impl<T: Real> NodeToFacet<T> {
             next += group.len();
             let stands = &rows.stands[first..next];
             let kept = Kept { reach, motion: motions[1 - pass], thick };
-            let ground = ground((pass, passes), surfaces, vicinity, places, kept, Self::rounding());
+            let ground = ground((pass, passes), surfaces, vicinity, places, kept, half_digits::<T>().value());
             // The list of the node is complete for surfaces up to this distance.
             let known = reach.known_around(node, positions[node], &motions[1 - pass]) - thick;
             let ground = ground.filter(|_| known > 0.0);

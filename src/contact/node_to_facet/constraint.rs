@@ -3,6 +3,7 @@
 use super::NodeToFacet;
 use super::candidates::{gap_of, pass_of};
 use super::rows::Rows;
+use crate::contact::affine_rows::{SearchState, set_friction};
 use crate::contact::surface::{Shape, Surface, overhang};
 use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates, Stride, check_local};
 use crate::error::Result;
@@ -17,25 +18,14 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         let Rows { identities, stands, affine, .. } = &self.rows;
         for (row, (&(node, candidate), stand)) in identities.iter().zip(stands).enumerate() {
             let pass = pass_of(candidate);
-            let position = self.nodes.positions[node];
-            let size = T::of(position.iter().fold(0.0, |most, x| most.max(x.abs())));
-            let mut contact = contacts.push_row((node, candidate), self.law, (&affine.jacobian, row));
-            contact.magnitude(size).position(position.map(T::of)).normal(stand.normal.map(T::of));
+            let mut contact = contacts.push_row((node, candidate), self.settings.given_law(), (&affine.jacobian, row));
+            contact.at(self.nodes.positions[node], stand.normal);
             contact.recovery(T::of(self.recovery()));
-            if self.friction == 0.0 {
-                continue;
-            }
-            contact.friction(self.friction);
             let surface = self.own_surface.as_ref().filter(|_| pass > 0).unwrap_or(&self.surface);
-            let vertices = surface.facets()[stand.facet].nodes();
-            for tangent in self.nodes.tangents(stand.normal) {
-                let shares = vertices.iter().zip(stand.weights).map(|(&vertex, weight)| (vertex, -weight));
-                let entries = std::iter::once((node, 1.0)).chain(shares).flat_map(|(node, share)| {
-                    let dofs = self.nodes.places(node);
-                    dofs.iter().zip(tangent).map(move |(&dof, along)| (dof, T::of(share * along)))
-                });
-                contact.tangent_entries(entries);
-            }
+            let vertices = surface.facets()[stand.facet].nodes().iter().zip(stand.weights);
+            let shares = std::iter::once((node, 1.0)).chain(vertices.map(|(&vertex, weight)| (vertex, -weight)));
+            let coefficient = self.settings.given_friction();
+            set_friction(&mut contact, coefficient, (&self.nodes, stand.normal), shares);
         }
     }
 
@@ -61,13 +51,13 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         if boxes[0].inflated(wide).intersects(&boxes[1]) {
             self.update_lists(&motions, range);
             for pass in 0..self.passes.len() {
-                self.find_rows(pass, &boxes[1 - pass].inflated(wide), (t, u, v), (&speeds, ahead));
+                self.find_rows(pass, &boxes[1 - pass].inflated(wide), &speeds, &SearchState { t, u, v, ahead });
             }
         }
         let (rows, found) = (&self.rows, &self.found);
         let same = rows.identities == found.identities && rows.affine.jacobian == found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+        Ok(Candidates::changed_if(!same))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
@@ -80,11 +70,11 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         self.move_rows(t, u)?;
         let same = self.rows.affine.jacobian == self.found.affine.jacobian;
         std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(if same { Candidates::Unchanged } else { Candidates::Changed })
+        Ok(Candidates::changed_if(!same))
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
-        self.look_at(step)
+        self.check_step(step)
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {

@@ -3,23 +3,13 @@
 use super::NodeToFacet;
 use super::candidates::pass_of;
 use crate::contact::surface::{Bounds, Facet, Ground, Point, Shape, Stand, add_scaled, dot, norm, sub};
-use crate::contact::{ContactLaw, LARGEST_MISS, STEEP, Stride, press_differently};
+use crate::contact::{COARSE, ContactLaw, FINE, LARGEST_MISS, STEEP, Stride, impacts_differ, kept_depth};
 use crate::error::Result;
 use crate::real::Real;
-
-/// Relative displacement, as a share of the smallest facet, up to which a node is not checked: it cannot pass
-/// anything larger than that.
-const FINE: f64 = 0.125;
-
-/// The same limit for two checks of nodes with rows: whether they went through a facet, and along which normal they
-/// were stopped. Below it a row lets its node in only over an edge, where the normal is not unique.
-const COARSE: f64 = 0.6;
+use crate::rounding::half_digits;
 
 /// Share of a path that may enter over a convex corner and leave again.
 const SHALLOW: f64 = 0.05;
-
-/// Depth, as a share of the smallest facet, below which it is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A node and the surface of its pass, at the start and at the end of a step.
 struct Crossing<'a> {
@@ -29,7 +19,7 @@ struct Crossing<'a> {
     /// The facet of its row, if it has one.
     likely: Option<usize>,
     /// A bound of its displacement relative to the surface.
-    way: f64,
+    path: f64,
     law: ContactLaw,
     /// Largest penetration that is recovered in a step.
     recovery: f64,
@@ -37,14 +27,14 @@ struct Crossing<'a> {
 
 impl<T: Real> NodeToFacet<T> {
     /// Rejects a step in which a node went through the other surface, or was stopped away from it.
-    pub(super) fn look_at(&mut self, step: &Stride<'_, T>) -> Result<()> {
+    pub(super) fn check_step(&mut self, step: &Stride<'_, T>) -> Result<()> {
         let mut ends = std::mem::take(&mut self.ends);
-        let result = self.look_along(step, &mut ends);
+        let result = self.check_paths(step, &mut ends);
         self.ends = ends;
         result
     }
 
-    fn look_along(&self, step: &Stride<'_, T>, ends: &mut [Vec<Point>; 2]) -> Result<()> {
+    fn check_paths(&self, step: &Stride<'_, T>, ends: &mut [Vec<Point>; 2]) -> Result<()> {
         let moved = |node: usize| self.nodes.way(node, step.u);
         let motions = self.nodes.boxes_of(moved);
         let longest = motions[0].farthest(&motions[1]);
@@ -62,12 +52,12 @@ impl<T: Real> NodeToFacet<T> {
             let own = if pass == 0 { self.own_surface.as_ref() } else { Some(&self.surface) };
             for (place, &node) in list.nodes.iter().enumerate() {
                 let row = rows.next_if(|&(_, identity)| identity == (node, pass)).map(|(row, _)| row);
-                let way = Bounds::of_points([moved(node)]).farthest(&motions[1 - pass]);
-                if way <= list.clearance[place] || way <= FINE * surface.finest() {
+                let path = Bounds::of_points([moved(node)]).farthest(&motions[1 - pass]);
+                if path <= list.clearance[place] || path <= FINE * surface.finest() {
                     continue;
                 }
                 // Lists are complete unless the node was faster than its velocity at the search.
-                let lists = Some(&list.lists).filter(|_| row.is_some() && way <= self.vicinity.reach.listed());
+                let lists = Some(&list.lists).filter(|_| row.is_some() && path <= self.vicinity.reach.listed());
                 let [start, end] = [0, 1].map(|k| Ground {
                     nodes: &list.nodes,
                     lists,
@@ -80,15 +70,15 @@ impl<T: Real> NodeToFacet<T> {
                     material: self.vicinity.material_of(pass),
                     positions: &ends[k],
                     offsets: self.vicinity.thickness.at(step.t[k]),
-                    rounding: Self::rounding(),
+                    rounding: half_digits::<T>().value(),
                 });
                 let likely = row.map(|row| self.rows.stands[row].facet);
-                let recovery = self.recovery();
-                let crossing = Crossing { grounds: [start, end], place, likely, node, way, law: self.law, recovery };
+                let (law, recovery) = (self.settings.given_law(), self.recovery());
+                let crossing = Crossing { grounds: [start, end], place, likely, node, path, law, recovery };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
                 let velocity = |node: usize| self.nodes.vector(node, step.v);
-                if let Err((what, way, gap)) = crossing.look_at(closed, velocity) {
-                    return Err(step.refuse((node, pass), what, way, gap));
+                if let Err((what, path, gap)) = crossing.check(closed, velocity) {
+                    return Err(step.rejected((node, pass), what, path, gap));
                 }
             }
         }
@@ -103,19 +93,19 @@ impl Crossing<'_> {
 
     /// Returns the reason for a rejection, the length of the path of the node, and the gap at its start. `closed`
     /// says whether its row, if any, was closed at the start and at the end.
-    fn look_at(
+    fn check(
         &self,
         closed: Option<[bool; 2]>,
         velocity: impl Fn(usize) -> Point,
     ) -> std::result::Result<(), (&'static str, f64, f64)> {
-        let range = 2.0 * self.way;
+        let range = 2.0 * self.path;
         let [start, end] = &self.grounds;
         let before = closed.and_then(|_| start.closest(self.place, f64::INFINITY, self.likely));
         let after = end.closest(self.place, range, self.likely);
         let gap = before.map_or(f64::INFINITY, |stand| stand.gap);
         let Some(from) = before else {
             return match self.passes(f64::INFINITY) {
-                true => Err(("was out of reach, and went through a facet", self.way, gap)),
+                true => Err(("was out of reach, and went through a facet", self.path, gap)),
                 false => Ok(()),
             };
         };
@@ -125,22 +115,22 @@ impl Crossing<'_> {
             let carried = nodes.iter().zip(from.weights);
             carried.fold(vector(self.node), |sum, (&vertex, weight)| add_scaled(sum, -weight, vector(vertex)))
         };
-        let way = against(&|node| sub(end.positions[node], start.positions[node]));
-        let length = norm(way);
+        let path = against(&|node| sub(end.positions[node], start.positions[node]));
+        let length = norm(path);
         let coarse = length > COARSE * start.surface.finest();
         // Includes the growth of the offset.
-        let linear = gap + dot(from.normal, way) - (end.offsets.factor - from.factor) * from.offset;
+        let linear = gap + dot(from.normal, path) - (end.offsets.factor - from.factor) * from.offset;
         if let Some([false, true]) = closed {
             let Some(to) = after.or_else(|| end.last(self.place, from.facet, range)) else {
                 return Err(("was stopped where the surface has ended", length, gap));
             };
-            let kept = self.law.kept_depth(gap, self.recovery);
+            let kept = kept_depth(gap, self.law.recovery(self.recovery));
             if (to.gap + kept).abs() > LARGEST_MISS * length {
                 return Err(("was stopped away from the surface", length, gap));
             }
             let speed = against(&velocity);
             let speeds = [from.normal, to.normal].map(|normal| dot(normal, speed));
-            if coarse && press_differently(speeds, dot(speed, speed)) {
+            if coarse && impacts_differ(speeds, dot(speed, speed)) {
                 return Err(("was stopped along a normal that is not the one where it met the surface", length, gap));
             }
         }
@@ -151,13 +141,13 @@ impl Crossing<'_> {
             inside || gap.max(-to.gap) < LARGEST_MISS * length && turn > -0.5
         };
         // A node that is already inside, for instance because an edge has penetrated beside it, may leave freely.
-        let outside = gap > -ROUNDING * start.surface.finest();
+        let outside = gap > -half_digits::<f64>() * start.surface.finest();
         if coarse && outside && !after.is_some_and(explained) && self.passes(length) {
             return Err(("went through a facet", length, gap));
         }
         let turned = after.is_some_and(|to| dot(from.normal, to.normal) < 0.0);
         // Rigid laws recover a penetration slowly.
-        if self.law.is_compliant() && gap < 0.0 && turned && -dot(from.normal, way) > STEEP * length {
+        if self.law.is_compliant() && gap < 0.0 && turned && -dot(from.normal, path) > STEEP * length {
             return Err(("went through the body that it was in", length, gap));
         }
         Ok(())

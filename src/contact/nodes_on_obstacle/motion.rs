@@ -55,20 +55,20 @@ impl<T: Real, const D: usize> Course<T, D> {
         Self { ends, carried, angle, h }
     }
 
-    /// A bound of the squared length of a path relative to the obstacle; `way` begins at x and is straight in space.
-    pub(super) fn square(&self, x: [T; D], way: [T; D]) -> T {
-        let straight = minus(way, self.carried);
+    /// A bound of the squared length of a path relative to the obstacle; `path` begins at x and is straight in space.
+    pub(super) fn square(&self, x: [T; D], path: [T; D]) -> T {
+        let straight = minus(path, self.carried);
         if self.angle == T::zero() {
             return dot(straight, straight);
         }
         let [from, to] = &self.ends;
-        let chord = minus(to.to_own(std::array::from_fn(|k| x[k] + way[k])), from.to_own(x));
-        let length = dot(chord, chord).sqrt() + self.bend(x, way);
+        let chord = minus(to.to_own(std::array::from_fn(|k| x[k] + path[k])), from.to_own(x));
+        let length = dot(chord, chord).sqrt() + self.bend(x, path);
         length * length
     }
 
     /// A bound of the distance of the path from the straight line between its ends, in the frame of the obstacle.
-    pub(super) fn bend(&self, x: [T; D], way: [T; D]) -> T {
-        self.ends[0].bend(x, minus(way, self.carried), self.angle, self.h)
+    pub(super) fn bend(&self, x: [T; D], path: [T; D]) -> T {
+        self.ends[0].bend(x, minus(path, self.carried), self.angle, self.h)
     }
 }

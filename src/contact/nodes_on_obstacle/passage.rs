@@ -2,7 +2,7 @@
 //! normal.
 
 use super::super::obstacle::{dot, minus};
-use super::super::{LARGEST_MISS, LARGEST_TURN, Obstacle, STEEP, press_differently};
+use super::super::{LARGEST_MISS, LARGEST_TURN, Obstacle, STEEP, impacts_differ};
 use super::Row;
 use crate::real::Real;
 
@@ -14,13 +14,13 @@ pub(super) fn turns_too_far<T: Real>(angle: T) -> bool {
 /// Checks the path of a node between two points in the frame of the obstacle, which begins with this velocity.
 /// Returns the reason for a rejection, and the gap at its start. The row of the node, if any, comes with its flags at
 /// the start and at the end: closed or not.
-pub(super) fn look_at<T: Real, const D: usize>(
+pub(super) fn check_path<T: Real, const D: usize>(
     obstacle: &dyn Obstacle<T, D>,
     row: Option<(&Row<T, D>, [bool; 2])>,
     ends: [[T; D]; 2],
     velocity: [T; D],
 ) -> std::result::Result<(), (&'static str, T)> {
-    let way = minus(ends[1], ends[0]);
+    let path = minus(ends[1], ends[0]);
     let (gap, normal) = obstacle.distance(ends[1]);
     let Some((row, [was_closed, closed])) = row else {
         let start = obstacle.distance(ends[0]).0;
@@ -35,14 +35,14 @@ pub(super) fn look_at<T: Real, const D: usize>(
             return Err(("presses on a surface that turns by more than 30 degrees on the way", start));
         }
         let speeds = [start_normal, normal].map(|n| dot(n, velocity).value());
-        if !was_closed && press_differently(speeds, dot(velocity, velocity).value()) {
+        if !was_closed && impacts_differ(speeds, dot(velocity, velocity).value()) {
             return Err(("was stopped along a normal that is not the one where it met the surface", start));
         }
         return Ok(());
     }
     // Within the step the gap of the row is linear. A node is missed if only the true gap is negative.
-    let missed = start + dot(start_normal, way) - gap;
-    if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(way, way).sqrt() {
+    let missed = start + dot(start_normal, path) - gap;
+    if gap < T::zero() && missed > T::of(LARGEST_MISS) * dot(path, path).sqrt() {
         return Err(("is in the body, and was taken to be outside", start));
     }
     match obstacle.passage(ends[0], ends[1]) {

@@ -1,7 +1,7 @@
 //! A capsule: all points near a straight line between two points.
 
-use super::{Obstacle, Side, dot, finite, minus, round, round_curvature};
-use crate::error::{Result, positive};
+use super::{Obstacle, Side, check_radius, dot, finite, minus, round, round_curvature};
+use crate::error::Result;
 use crate::real::Real;
 
 /// A straight rod of constant thickness with round ends: a rod, a finger, a post.
@@ -30,7 +30,7 @@ impl<T: Real, const D: usize> Capsule<T, D> {
         for end in &ends {
             finite("an end of the capsule", end)?;
         }
-        positive("the radius of the capsule", radius.value())?;
+        check_radius("the radius of the capsule", radius)?;
         Ok(Self { ends, radius })
     }
 

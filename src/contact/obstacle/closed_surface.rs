@@ -5,6 +5,7 @@ use crate::contact::Facet;
 use crate::contact::surface::{Foot, Location, Point, Shape, Surface};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
+use crate::rounding::{half_digits, rounding};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{ParentNode, RTree, RTreeNode, RTreeObject};
 use std::collections::HashMap;
@@ -132,7 +133,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         for child in order.filter_map(|k| children.get(k)) {
             let limit = best.map_or(f64::INFINITY, |best| best.projected.1.distance);
             // Both sides are rounded.
-            if away(child) > limit * limit * (1.0 + 16.0 * f64::EPSILON) {
+            if away(child) > limit * limit + rounding(limit * limit) {
                 continue;
             }
             match child {
@@ -155,8 +156,8 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
 
     /// The normal, and the signed distance from the surface without the rounding.
     fn direction(&self, p: Point, nearest: &Nearest) -> Option<(Point, f64)> {
-        let rounding = f64::EPSILON.sqrt();
-        self.surface.direction(nearest.facet, p, &nearest.projected, (rounding, &|_| true), &self.positions)
+        let near = half_digits();
+        self.surface.direction(nearest.facet, p, &nearest.projected, (near, &|_| true), &self.positions)
     }
 }
 
@@ -198,7 +199,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for ClosedSurface<T, D> {
         let Some(nearest) = self.nearest(p) else { return T::nan() };
         let Some((normal, distance)) = self.direction(p, &nearest) else { return T::nan() };
         let (shape, foot) = &nearest.projected;
-        if foot.distance <= f64::EPSILON.sqrt() * shape.size() {
+        if foot.distance <= half_digits::<f64>() * shape.size() {
             return T::zero();
         }
         // Around an edge or a vertex the normal turns with the velocity across it.

@@ -1,8 +1,9 @@
 //! A round cone with a base.
 
-use super::{Obstacle, Side, across, dot, finite, length, minus, round, round_curvature};
+use super::{Obstacle, Side, across, check_radius, dot, finite, length, minus, round, round_curvature};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
+use crate::rounding::rounding;
 
 /// A straight round cone with a flat base and a rounded tip and rim: a funnel's plug, an indenter, a bit.
 ///
@@ -52,7 +53,7 @@ impl<T: Real> Cone<T> {
         finite("the center of the cone's base", &base)?;
         finite("the tip of the cone", &tip)?;
         positive("the radius of the cone's base", radius.value())?;
-        positive("the radius of the cone's rounding", rounding.value())?;
+        check_radius("the radius of the cone's rounding", rounding)?;
         let way = minus(tip, base);
         let axis = super::unit("the axis of the cone", way)?;
         let height = length(way);
@@ -80,8 +81,7 @@ impl<T: Real> Cone<T> {
         let off: [T; 3] = std::array::from_fn(|k| r[k] - z * self.axis[k]);
         let s = length(off);
         // On the axis itself any direction across it is valid; within rounding of it the direction is unknown.
-        let rounding = T::of(4.0) * T::epsilon() * (length(r) + self.height);
-        let outward = if s <= rounding { across(self.axis)[0] } else { off.map(|x| x / s) };
+        let outward = if s <= rounding(length(r) + self.height) { across(self.axis)[0] } else { off.map(|x| x / s) };
         (outward, s, z)
     }
 

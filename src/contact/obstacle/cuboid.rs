@@ -1,6 +1,6 @@
 //! A box with sides along the axes.
 
-use super::{Obstacle, Side, dot, finite, minus, round_curvature};
+use super::{Obstacle, Side, check_radius, finite, length, minus, round_curvature};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 
@@ -35,7 +35,7 @@ impl<T: Real, const D: usize> Cuboid<T, D> {
     /// shortest side; [`Error::NotFinite`].
     pub fn new(center: [T; D], half: [T; D], rounding: T) -> Result<Self> {
         finite("the center of the cuboid", &center)?;
-        positive("the radius of the cuboid's edges", rounding.value())?;
+        check_radius("the radius of the cuboid's edges", rounding)?;
         for half in half {
             let half = positive("half a side of the cuboid", half.value())?;
             if rounding.value() > half {
@@ -72,10 +72,9 @@ impl<T: Real, const D: usize> Obstacle<T, D> for Cuboid<T, D> {
         let farthest = (1..D).fold(0, |most, k| if beyond[k] > beyond[most] { k } else { most });
         let outer = beyond.iter().filter(|beyond| **beyond > T::zero()).count();
         if outer > 1 {
-            let scaled = Self::outer(beyond, beyond).map(|x| x / beyond[farthest]);
-            let length = dot(scaled, scaled).sqrt();
-            let normal = std::array::from_fn(|k| signs[k] * scaled[k] / length);
-            return (beyond[farthest] * length - self.rounding, normal);
+            let arm = Self::outer(beyond, beyond);
+            let length = length(arm);
+            return (length - self.rounding, std::array::from_fn(|k| signs[k] * arm[k] / length));
         }
         // NaN is passed on to the distance.
         let distance = beyond.iter().fold(beyond[farthest], |most, x| if x.is_nan() { *x } else { most });

@@ -40,11 +40,6 @@ pub(super) fn near(surface: &Surface, positions: &[Point], reach: f64) -> Neighb
 }
 
 impl Material {
-    /// As [`new`](Self::new), with the facets within range.
-    pub(crate) fn of(surface: &Surface, positions: &[Point], known: (f64, f64)) -> Self {
-        Self::new(surface, &near(surface, positions, known.0), positions, known)
-    }
-
     /// Measures the thickness at a node as its distance to the closest facet of the same body that it is behind, of
     /// the facets `near` it. A body must not penetrate itself, except by the `overlap` of negative offsets.
     pub(super) fn new(

@@ -2,29 +2,19 @@
 
 use super::Facet;
 use super::ramp::Ramp;
-use crate::error::{Error, Result};
 use crate::real::Real;
 
 /// Offsets by node of a mesh, at full size, and their factor in time. An empty list means zero.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Thickness {
     by_node: Vec<f64>,
     pub(crate) ramp: Ramp,
 }
 
 impl Thickness {
-    /// Sets one offset per node. Rejects lists of another length and values that are not finite.
-    pub(crate) fn set<T: Real>(&mut self, offsets: &[T], nodes: usize) -> Result<()> {
-        let (expected, found) = (nodes, offsets.len());
-        if found != expected {
-            return Err(Error::Dimension { what: "the list of offsets by node", expected, found });
-        }
-        let by_node: Vec<f64> = offsets.iter().map(|offset| offset.value()).collect();
-        if let Some((index, &value)) = by_node.iter().enumerate().find(|(_, offset)| !offset.is_finite()) {
-            return Err(Error::NotFinite { what: "the list of offsets (by node)", index, value });
-        }
-        self.by_node = by_node;
-        Ok(())
+    /// With one offset per node, or none.
+    pub(crate) fn new<T: Real>(offsets: &[T], ramp: Ramp) -> Self {
+        Self { by_node: offsets.iter().map(|offset| offset.value()).collect(), ramp }
     }
 
     pub(crate) fn is_none(&self) -> bool {
@@ -58,7 +48,7 @@ impl Thickness {
 
     /// The largest penetration, at any time, of the facets of two surfaces that just touch.
     pub(crate) fn overlap(&self, bodies: &[Vec<usize>; 2]) -> f64 {
-        self.ramp.factors().map(|factor| -self.bounds(bodies, factor)[0]).into_iter().fold(0.0, f64::max)
+        self.ramp.factors.map(|factor| -self.bounds(bodies, factor)[0]).into_iter().fold(0.0, f64::max)
     }
 }
 

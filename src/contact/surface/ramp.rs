@@ -3,10 +3,10 @@
 use crate::error::{Error, Result};
 
 /// A factor by time: one value until the first time, another from the second on, smooth in between.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ramp {
-    times: [f64; 2],
-    factors: [f64; 2],
+    pub(crate) times: [f64; 2],
+    pub(crate) factors: [f64; 2],
 }
 
 impl Default for Ramp {
@@ -18,7 +18,8 @@ impl Default for Ramp {
 
 impl Ramp {
     /// Rejects values that are not finite, and an end that is not after the beginning.
-    pub(crate) fn new(times: [f64; 2], factors: [f64; 2]) -> Result<Self> {
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { times, factors } = self;
         let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
         if let Some(&time) = times.iter().find(|time| !time.is_finite()) {
             return refuse("a time of a ramp", time, "finite");
@@ -29,17 +30,12 @@ impl Ramp {
         if times[1] <= times[0] {
             return refuse("the end of a ramp less its beginning", times[1] - times[0], "positive");
         }
-        Ok(Self { times, factors })
+        Ok(())
     }
 
     /// The elapsed share of the ramp at t, from 0 to 1.
     fn place(&self, t: f64) -> f64 {
         ((t - self.times[0]) / (self.times[1] - self.times[0])).clamp(0.0, 1.0)
-    }
-
-    /// The factor at the beginning and at the end.
-    pub(crate) fn factors(&self) -> [f64; 2] {
-        self.factors
     }
 
     /// The second time derivative of the factor.

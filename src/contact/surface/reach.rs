@@ -3,8 +3,6 @@
 use super::nodes::Nodes;
 use super::search::Bounds;
 use super::shape::{Point, sub};
-use crate::error::{Result, positive};
-use crate::real::Real;
 
 /// The least distance at which surfaces are found, and the nodal positions when the lists of near facets were built.
 #[derive(Debug)]
@@ -19,24 +17,12 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
-    pub(crate) fn new(least: f64) -> Self {
-        Self { least, skin: None, listed: 0.0, built_at: Vec::new() }
+    pub(crate) fn new(least: f64, skin: Option<f64>) -> Self {
+        Self { least, skin, listed: 0.0, built_at: Vec::new() }
     }
 
     pub(crate) fn least(&self) -> f64 {
         self.least
-    }
-
-    pub(crate) fn set_least<T: Real>(&mut self, reach: T) -> Result<()> {
-        self.least = positive("the reach of a contact search", reach.value())?;
-        self.forget();
-        Ok(())
-    }
-
-    pub(crate) fn set_skin<T: Real>(&mut self, skin: T) -> Result<()> {
-        self.skin = Some(positive("the skin of a contact search", skin.value())?);
-        self.forget();
-        Ok(())
     }
 
     pub(crate) fn forget(&mut self) {

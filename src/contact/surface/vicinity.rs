@@ -5,9 +5,9 @@ use super::Surface;
 use super::kin::Kin;
 use super::material::{Material, near};
 use super::offsets::Thickness;
-use super::ramp::Ramp;
 use super::reach::Reach;
 use super::shape::Point;
+use crate::contact::SurfaceSettings;
 use crate::error::Result;
 use crate::real::Real;
 
@@ -24,15 +24,24 @@ pub(crate) struct Vicinity {
 }
 
 impl Vicinity {
-    /// For two surfaces without offsets.
-    pub(crate) fn new(reach: f64) -> Self {
-        let (reach, thickness) = (Reach::new(reach), Thickness::default());
-        Self { reach, thickness, kin: None, material: Vec::new(), rings: None }
-    }
-
-    /// For a surface against itself, with one ring excluded.
-    pub(crate) fn of_itself(reach: f64) -> Self {
-        Self { rings: Some(1), ..Self::new(reach) }
+    /// For two surfaces of a mesh with this number of nodes, or for a surface against itself. `typical` is the reach
+    /// if none is given. Rejects settings out of range.
+    pub(crate) fn new<T: Real>(
+        settings: &SurfaceSettings<T>,
+        nodes: usize,
+        typical: f64,
+        of_itself: bool,
+    ) -> Result<Self> {
+        settings.check(nodes)?;
+        let SurfaceSettings { reach, skin, offsets, ramp, rings, .. } = settings;
+        let reach = reach.map_or(typical, |reach| reach.value());
+        Ok(Self {
+            reach: Reach::new(reach, skin.map(|skin| skin.value())),
+            thickness: Thickness::new(offsets.as_deref().unwrap_or_default(), ramp.unwrap_or_default()),
+            kin: None,
+            material: Vec::new(),
+            rings: of_itself.then_some(rings.unwrap_or(1)),
+        })
     }
 
     pub(crate) fn is_of_itself(&self) -> bool {
@@ -69,30 +78,5 @@ impl Vicinity {
         self.reach.forget();
         self.kin = None;
         self.material.clear();
-    }
-
-    /// Sets the number of rings of facets around a node that are excluded, for a surface against itself.
-    pub(crate) fn set_rings(&mut self, rings: usize) {
-        self.rings = self.rings.map(|_| rings);
-        self.forget();
-    }
-
-    /// Sets one offset per node. Rejects lists of another length and values that are not finite.
-    pub(crate) fn set_offsets<T: Real>(&mut self, offsets: &[T], nodes: usize) -> Result<()> {
-        self.thickness.set(offsets, nodes)?;
-        self.forget();
-        Ok(())
-    }
-
-    pub(crate) fn set_ramp(&mut self, times: [f64; 2], factors: [f64; 2]) -> Result<()> {
-        self.thickness.ramp = Ramp::new(times, factors)?;
-        self.forget();
-        Ok(())
-    }
-
-    pub(crate) fn set_least<T: Real>(&mut self, reach: T) -> Result<()> {
-        self.reach.set_least(reach)?;
-        self.forget();
-        Ok(())
     }
 }

@@ -4,13 +4,8 @@
 use crate::contact::surface::{
     Base, ByNode, Facet, Neighborhood, Nodes, Point, Sample, Surface, add_scaled, cross, dot, norm, sub, unit,
 };
+use crate::rounding::{LEAST_COVER, half_digits};
 use std::ops::Range;
-
-/// Least covered share of a node's area for a row.
-const LEAST: f64 = 1e-6;
-
-/// Distance of surfaces, as a share of a facet, up to which they coincide: then rows are constant.
-const FITS: f64 = 1e-8;
 
 const SPACE: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -72,7 +67,7 @@ impl Joint {
     pub(super) fn new(slave: &Surface, master: &Surface, positions: &[Point], reach: f64) -> Self {
         let (covered, areas) = cover(slave, master, positions, reach);
         let whole = slave.areas_at(positions);
-        let is_tied = |&place: &usize| areas[place] > LEAST * whole[place];
+        let is_tied = |&place: &usize| areas[place] > LEAST_COVER * whole[place];
         let places: Vec<usize> = (0..areas.len()).filter(is_tied).collect();
         let mut joint = Self {
             tied: places.iter().map(|&place| slave.nodes()[place]).collect(),
@@ -133,7 +128,8 @@ impl Joint {
             let size = piece.facet.shape(positions).size();
             for (apart, row) in self.apart(piece, positions).into_iter().zip(piece.rows) {
                 if let Some((place, _)) = row {
-                    self.turns |= norm(apart) > FITS * size;
+                    // Rows of surfaces that coincide are constant.
+                    self.turns |= norm(apart) > half_digits::<f64>() * size;
                     self.initial[place] = add_scaled(self.initial[place], 1.0, apart);
                 }
             }

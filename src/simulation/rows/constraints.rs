@@ -114,7 +114,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             // Reserves memory for the largest constraint.
             scratch.clear();
             constraint.contacts(&mut scratch);
-            room += contacts.len() + contacts.rubbing_rows();
+            room += contacts.len() + contacts.friction_rows();
             own.push(Part {
                 variation: constraint.variation(),
                 inspects: constraint.inspects(),
@@ -324,8 +324,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                     ids.push(contact);
                 }
                 let law = contacts.law(row);
-                law.check()?;
-                law.check_scalar::<T>()?;
+                law.check::<T>()?;
                 admitted.check(law)?;
                 laws.push(law);
                 let magnitude = contacts.magnitude(row);

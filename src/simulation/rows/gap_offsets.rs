@@ -41,7 +41,7 @@ impl<T: Real> GapOffsets<T> {
             let (name, range) = ("the penetration that a contact may recover in a step", "from 0");
             return Err(Error::Parameter { name, value: recovery.value(), range });
         }
-        self.recoveries.push(if law.keeps_depths() { recovery } else { T::infinity() });
+        self.recoveries.push(law.recovery(recovery));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Gaps against brute force and differences: rows, signs, continuity, rims.
 
 use super::{Cells, Mesh, box_of_quadrilaterals, gaps, grid, imbalance, polygon, rows, single_gap};
-use contact_dynamics::contact::{Facet, NodeToFacet};
+use contact_dynamics::contact::{Facet, NodeToFacet, SurfaceSettings};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::Congruential;
 
@@ -356,7 +356,10 @@ fn nodes_in_a_dent_have_a_row_for_each_side() {
     // Up one side and over its end, the shorter one: its row goes on, for the node has not left the other side.
     let coordinates = [[2.0, 0.5], [1.0, 0.0], [0.8, 0.1], [1.0, 0.02]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-    let mut short = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(1.0).unwrap();
+    let mut short = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]])
+        .unwrap()
+        .with(SurfaceSettings::new().reach(1.0))
+        .unwrap();
     assert_eq!(gaps(&mut short, &zero).len(), 2);
     for s in [0.1, 0.3, 0.5] {
         let mut u = zero;

@@ -1,7 +1,7 @@
 //! Candidates and kept lists, one pass and two, runs in which candidates change, and what is refused.
 
 use super::{Cells, Mesh, gaps, grid, imbalance, rows};
-use contact_dynamics::contact::{Candidates, ContactLaw, Facet, NodeToFacet};
+use contact_dynamics::contact::{Candidates, ContactLaw, Facet, NodeToFacet, SurfaceSettings};
 use contact_dynamics::{Composite, ContactConstraint, Error, LinearSystem, PersistencyCorrection, Simulation};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::Congruential;
@@ -17,9 +17,9 @@ fn kept_lists_find_what_all_facets_give() {
             .map(|_| [4.0 + 4.0 * random.signed(), 4.0 + 4.0 * random.signed(), 0.6 * random.signed()])
             .collect();
         let nodes = mesh.nodes(cloud);
-        let mut kept = mesh.contact(&nodes, 0.4).skin(0.2).unwrap();
+        let mut kept = mesh.contact(&nodes, 0.4).with(SurfaceSettings::new().skin(0.2)).unwrap();
         // A skin that is never used up: every node looks at every facet.
-        let mut all = mesh.contact(&nodes, 0.4).skin(1e6).unwrap();
+        let mut all = mesh.contact(&nodes, 0.4).with(SurfaceSettings::new().skin(1e6)).unwrap();
         let velocity = random.vector(mesh.size(), 0.03);
         let mut u = vec![0.0; mesh.size()];
         let mut changes = 0;
@@ -118,7 +118,10 @@ fn two_passes_treat_both_surfaces_alike() {
     let dofs = mesh.dofs();
     let make = |own: &[Facet], facets: &[Facet]| {
         let [own, facets] = [own, facets].map(|facets| facets.iter().copied());
-        NodeToFacet::new(&mesh.coordinates, &dofs, own, facets).unwrap().reach(0.6).unwrap()
+        NodeToFacet::new(&mesh.coordinates, &dofs, own, facets)
+            .unwrap()
+            .with(SurfaceSettings::new().reach(0.6))
+            .unwrap()
     };
     let mut one = make(&upper_facets, &lower_facets);
     let mut two = make(&lower_facets, &upper_facets);
@@ -244,7 +247,7 @@ fn the_parts_of_the_interface() {
     let make = || {
         NodeToFacet::one_pass(&mesh.coordinates, &dofs, &nodes, mesh.facets.iter().copied())
             .unwrap()
-            .reach(0.5)
+            .with(SurfaceSettings::new().reach(0.5))
             .unwrap()
     };
     let mut contact: Box<dyn ContactConstraint<f64>> = Box::new(make().with_law(ContactLaw::Equality));
@@ -290,7 +293,9 @@ fn wrong_input_is_refused() {
     let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.1], [2.0, 0.0, 0.0]];
     let dofs: Vec<[usize; 3]> = (0..6).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
     let make = |nodes: &[usize], facets: &[Facet], reach: f64| {
-        NodeToFacet::one_pass(&flat, &dofs, nodes, facets.iter().copied())?.reach(reach).map(|_| ())
+        NodeToFacet::one_pass(&flat, &dofs, nodes, facets.iter().copied())?
+            .with(SurfaceSettings::new().reach(reach))
+            .map(|_| ())
     };
     let triangle = Facet::from([0, 1, 2]);
     make(&[4], &[triangle], 1.0).unwrap();
@@ -326,7 +331,7 @@ fn wrong_input_is_refused() {
     let refused = NodeToFacet::one_pass(&[[0.0], [1.0]], &[[0], [1]], &[1], [[0, 0]]);
     assert!(matches!(refused, Err(Error::Dimension { found: 1, .. })));
     let contact = NodeToFacet::one_pass(&flat, &dofs, &[4], [[0, 1, 2]]).unwrap();
-    assert!(matches!(contact.skin(0.0), Err(Error::Parameter { .. })));
+    assert!(matches!(contact.with(SurfaceSettings::new().skin(0.0)), Err(Error::Parameter { .. })));
     let shared = NodeToFacet::new(&flat, &dofs, [[3, 4, 2]], [[0, 1, 2]]);
     assert!(matches!(shared, Err(Error::Incompatible { .. })));
 }
@@ -337,7 +342,10 @@ fn wrong_input_is_refused() {
 fn a_run_with_candidates_that_change() {
     let coordinates = [[2.0, 0.0], [1.0, 0.05], [0.0, 0.0], [0.4, 0.2]];
     let dofs = [[0, 1], [2, 3], [4, 5], [6, 7]];
-    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]]).unwrap().reach(0.1).unwrap();
+    let contact = NodeToFacet::one_pass(&coordinates, &dofs, &[3], [[0, 1], [1, 2]])
+        .unwrap()
+        .with(SurfaceSettings::new().reach(0.1))
+        .unwrap();
     let ties = [(0, 2), (1, 3), (2, 4), (3, 5), (0, 4), (1, 5)];
     let stiffness = matrix(8, ties.into_iter().flat_map(|(i, j)| spring(i, j, 50.0)));
     let mass = vec![2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0, 1.0];

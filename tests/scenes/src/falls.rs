@@ -4,7 +4,7 @@ use crate::OnSystem;
 use crate::hyperelastic::{Hyperelastic, Law};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
-use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, NodeToFacet};
+use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, NodeToFacet, SurfaceSettings};
 use contact_dynamics::{PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
@@ -105,7 +105,7 @@ impl Fall {
 
     /// Nodes on facets in two passes.
     pub fn two_passes(&self) -> Result<NodeToFacet<f64>> {
-        self.stack.nodes_on_facets(2)?.reach(0.2)
+        self.stack.nodes_on_facets(2)?.with(SurfaceSettings::new().reach(0.2))
     }
 
     /// Weighted gaps, the upper block being the slave.
@@ -115,12 +115,12 @@ impl Fall {
 
     /// Weighted gaps, nodes at corners and edges, and edges, the upper block being the slave.
     pub fn bodies(&self) -> Result<Vec<Box<dyn ContactConstraint<f64>>>> {
-        self.stack.bodies(true)?.reach(0.2).constraints()
+        self.stack.bodies(true)?.with(SurfaceSettings::new().reach(0.2)).unwrap().constraints()
     }
 
     /// Edges on edges.
     pub fn edges(&self) -> Result<EdgeToEdge<f64>> {
-        self.stack.edges()?.reach(0.2)
+        self.stack.edges()?.with(SurfaceSettings::new().reach(0.2))
     }
 
     fn of_itself(&self) -> Result<Vec<Box<dyn ContactConstraint<f64>>>> {

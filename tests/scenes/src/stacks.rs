@@ -1,7 +1,9 @@
 //! Two bodies upon each other whose meshes need not match, and the patch test on them.
 
 use crate::solids::{Material, Solid};
-use contact_dynamics::contact::{BodyContact, ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, Tie};
+use contact_dynamics::contact::{
+    BodyContact, ContactConstraint, EdgeToEdge, Facet, Mortar, NodeToFacet, SurfaceSettings, Tie,
+};
 use contact_dynamics::{LinearSystem, Newmark, Result, Simulation, System};
 
 /// Two bodies, one upon the other, and their facets that face each other: those of the lower one, and of the upper one.
@@ -64,7 +66,7 @@ impl<const D: usize> Stack<D> {
 
     /// Weighted gaps as among [`bodies`](Self::bodies), of surfaces that may have corners.
     pub fn weighted(&self, upper: bool, reach: f64) -> Result<Box<dyn ContactConstraint<f64>>> {
-        Ok(self.bodies(upper)?.reach(reach).constraints()?.remove(0))
+        Ok(self.bodies(upper)?.with(SurfaceSettings::new().reach(reach))?.constraints()?.remove(0))
     }
 
     /// What keeps the bodies apart by faces, corners and edges, the upper one being the slave, or the lower one.

@@ -55,7 +55,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                     reason: "such dofs stop and start at once; choose `ContactLaw::Rigid`, or give them a mass",
                 });
             }
-            if law.leaves_jumps() && has_mass {
+            if !law.is_compliant() && has_mass {
                 match (closed, was_closed) {
                     (true, _) => buffers.closed.push(row),
                     (false, true) => buffers.opened.push(row),

@@ -6,7 +6,7 @@ use super::meeting::{Between, Carried, Kind, Meeting};
 use super::space::{Boxed, Dimension, Space};
 use contact_dynamics::contact::{
     BodyContact, BondStrength, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet, NodesOnObstacle,
-    Obstacle, Plane, Side, Sphere, Surface, Tie,
+    Obstacle, Plane, Side, Sphere, Surface, SurfaceSettings, Tie,
 };
 use contact_dynamics::{LinearSystem, Result, System};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -362,10 +362,10 @@ where
         let reach = 0.09 * drawn.units.length;
         scene.constraints = if kind == Kind::FoldWithEdges {
             let contact = BodyContact::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
-            contact.reach(reach).constraints()?
+            contact.with(SurfaceSettings::new().reach(reach))?.constraints()?
         } else {
             let contact = NodeToFacet::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
-            vec![Box::new(contact.reach(reach)?)]
+            vec![Box::new(contact.with(SurfaceSettings::new().reach(reach))?)]
         };
         Ok(scene)
     }
@@ -409,7 +409,7 @@ where
         let mut scene = Self::assembled(bodies, drawn, &|body, x| flights[body](x));
         let (dofs, facets) = (scene.node_dofs(), scene.facets(variant).concat());
         let contact = BodyContact::of_itself(&scene.nodes, &dofs, facets)?.friction(drawn.friction);
-        scene.constraints = contact.reach(0.1 * drawn.units.length).constraints()?;
+        scene.constraints = contact.with(SurfaceSettings::new().reach(0.1 * drawn.units.length))?.constraints()?;
         Ok(scene)
     }
 
@@ -463,7 +463,7 @@ where
         // Of bodies with corners weighted gaps are among what keeps them apart.
         let bodies = || BodyContact::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied());
         let weighted = |bodies: BodyContact<f64, D>| -> Result<Boxed> {
-            Ok(bodies.friction(drawn.friction).reach(reach).constraints()?.remove(0))
+            Ok(bodies.friction(drawn.friction).with(SurfaceSettings::new().reach(reach))?.constraints()?.remove(0))
         };
         found.push(match between {
             Between::OnePass => {
@@ -471,29 +471,38 @@ where
                 slaves.sort_unstable();
                 slaves.dedup();
                 let contact = NodeToFacet::one_pass(nodes, &dofs, &slaves, lower.iter().copied())?;
-                Box::new(contact.friction(drawn.friction).reach(reach)?)
+                Box::new(contact.friction(drawn.friction).with(SurfaceSettings::new().reach(reach))?)
             }
             Between::TwoPasses | Between::TwoPassesAndEdges => {
                 let contact = NodeToFacet::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?;
-                Box::new(contact.friction(drawn.friction).reach(reach)?)
+                Box::new(contact.friction(drawn.friction).with(SurfaceSettings::new().reach(reach))?)
             }
             Between::OneSurfaceWithEdges => {
                 let contact = BodyContact::of_itself(nodes, &dofs, lower.iter().chain(&upper).copied())?;
-                return contact.friction(drawn.friction).reach(reach).constraints();
+                return contact.friction(drawn.friction).with(SurfaceSettings::new().reach(reach))?.constraints();
             }
             Between::OneSurface => {
                 let facets = lower.iter().chain(&upper).copied();
-                Box::new(NodeToFacet::of_itself(nodes, &dofs, facets)?.friction(drawn.friction).reach(reach)?)
+                Box::new(
+                    NodeToFacet::of_itself(nodes, &dofs, facets)?
+                        .friction(drawn.friction)
+                        .with(SurfaceSettings::new().reach(reach))?,
+                )
             }
             Between::Mortar | Between::MortarAndEdges => weighted(bodies()?)?,
             Between::Offsets => {
                 let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
-                weighted(bodies()?.offsets(&offsets)?)?
+                weighted(bodies()?.with(SurfaceSettings::new().offsets(&offsets))?)?
             }
             Between::Coated => {
                 let offsets: Vec<f64> = nodes.iter().map(|_| thick * length * random.within(0.5, 1.0)).collect();
                 let contact = NodeToFacet::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?;
-                Box::new(contact.offsets(&offsets)?.friction(drawn.friction).reach(reach)?)
+                Box::new(
+                    contact
+                        .with(SurfaceSettings::new().offsets(&offsets))?
+                        .friction(drawn.friction)
+                        .with(SurfaceSettings::new().reach(reach))?,
+                )
             }
             Between::Bonds => {
                 let material = self.bodies[1].solid.material;
@@ -511,7 +520,7 @@ where
                     Ok(found)
                 };
                 let bonded = Mortar::new(nodes, &dofs, facing(&upper, -1.0)?, facing(&lower, 1.0)?)?;
-                let bonded = bonded.friction(drawn.friction).reach(reach)?;
+                let bonded = bonded.friction(drawn.friction).with(SurfaceSettings::new().reach(reach))?;
                 Box::new(bonded.bonded(BondStrength::new(strengths[0], strengths[1])?)?)
             }
             Between::Tie => Box::new(Tie::new(nodes, &dofs, upper.iter().copied(), lower.iter().copied())?),

@@ -2,7 +2,7 @@
 
 use super::bodies::dot;
 use contact_dynamics::Result;
-use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Obstacle, RigidMotion};
+use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Obstacle, RigidMotion, SurfaceSettings};
 use contact_dynamics_scenes::obstacles::{Named, in_plane_of_size, in_space_of_size};
 use contact_dynamics_scenes::random::Congruential;
 
@@ -52,7 +52,7 @@ impl Dimension<3> for Space<3> {
         reach: f64,
     ) -> Result<Option<Boxed>> {
         let edges = EdgeToEdge::new(nodes, dofs, one.iter().copied(), other.iter().copied())?;
-        Ok(Some(Box::new(edges.reach(reach)?)))
+        Ok(Some(Box::new(edges.with(SurfaceSettings::new().reach(reach))?)))
     }
 }
 
