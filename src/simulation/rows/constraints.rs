@@ -7,7 +7,7 @@ use crate::contact::{
 use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::build::admitted::Admitted;
+use crate::simulation::build::law_support::LawSupport;
 use crate::simulation::rows::kept_depths::recovery_of;
 use crate::simulation::rows::laws::Laws;
 use crate::simulation::rows::part::{Local, Part, gather, of};
@@ -34,7 +34,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     interface: Vec<usize>,
     /// Interface index of each dof of the system; `UNKNOWN` or `NO_RESPONSE` for dofs that are not on the interface.
     places: Vec<usize>,
-    admitted: Admitted,
+    law_support: LawSupport,
     /// Whether candidates have changed since the rows were last read.
     pub(crate) stale: bool,
     /// Number of times the rows have been read, and version of their names.
@@ -72,7 +72,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         (t, u, v): (f64, &[T], &[T]),
         prescribed: &[usize],
         broken: &[BrokenBond],
-        admitted: Admitted,
+        law_support: LawSupport,
     ) -> Result<(Self, ContactJacobian<T>)> {
         let dofs = u.len();
         if let Some(bond) = broken.iter().find(|bond| bond.constraint >= parts.len()) {
@@ -142,7 +142,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             local,
             interface,
             places,
-            admitted,
+            law_support,
             stale: true,
             version: 0,
             names: Names::default(),
@@ -296,7 +296,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses rows that do not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, magnitudes, recoveries, places, admitted, .. } = self;
+        let Self { parts, ids, names, laws, magnitudes, recoveries, places, law_support, .. } = self;
         jacobian.clear();
         laws.clear();
         magnitudes.clear();
@@ -321,7 +321,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 let law = contacts.law(row);
                 law.check()?;
                 law.check_scalar::<T>()?;
-                admitted.check(law)?;
+                law_support.check(law)?;
                 laws.push(law);
                 let magnitude = contacts.magnitude(row);
                 if !magnitude.is_finite() {
@@ -354,7 +354,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads the tangential rows of contacts with friction, which follow the rows of all gaps.
     fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, names, laws, tangents, old_tangents, places, admitted, .. } = self;
+        let Self { parts, ids, names, laws, tangents, old_tangents, places, law_support, .. } = self;
         std::mem::swap(tangents, old_tangents);
         tangents.clear();
         if parts.iter().any(|part| part.contacts.has_friction()) {
@@ -369,7 +369,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                         continue;
                     }
                     let rows = contacts.tangents_of(own);
-                    admitted.check_friction(ids[row], (friction, laws[row], rows.len()))?;
+                    law_support.check_friction(ids[row], (friction, laws[row], rows.len()))?;
                     for tangent in rows.clone() {
                         let entries = contacts.tangent_rows().row(tangent);
                         check_entries(entries, (dofs, places), ids[row], "a weight of a tangent (by dof)")?;

@@ -3,7 +3,7 @@
 use crate::contact::{ContactConstraint, Contacts, GapRates};
 use crate::error::Result;
 use crate::real::Real;
-use crate::state::resolution;
+use crate::rounding::time_resolution;
 
 /// Memory for differences of gaps.
 pub(crate) struct RateDifferences<T> {
@@ -72,7 +72,7 @@ impl<T: Real> RateDifferences<T> {
             constraint.gaps(t + s, moved, gaps)
         };
         // Increments that are representable at t.
-        let [single, double] = shares::<T>().map(|share| (t + (share * ahead).max(resolution(t))) - t);
+        let [single, double] = shares::<T>().map(|share| (t + (share * ahead).max(time_resolution(t))) - t);
         gaps(-single, T::zero(), before)?;
         gaps(single, T::zero(), after)?;
         let size = |row: usize| -> T {
