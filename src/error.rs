@@ -1,43 +1,17 @@
 //! The error type of the crate: every variant carries its numbers and says what to do.
 
 mod check;
-
-/// The text for a number of bytes.
-fn asked(bytes: Option<usize>) -> String {
-    bytes.map_or_else(String::new, |bytes| format!(": {bytes} bytes were asked for"))
-}
-
-/// A number as printed in messages: four significant digits.
-pub(crate) fn few(x: f64) -> f64 {
-    rounded(x, 3)
-}
-
-/// A time as printed in messages: nine significant digits, enough to distinguish steps.
-fn moment(t: f64) -> f64 {
-    rounded(t, 8)
-}
-
-fn rounded(x: f64, decimals: usize) -> f64 {
-    format!("{x:.decimals$e}").parse().ok().filter(|rounded: &f64| rounded.is_finite()).unwrap_or(x)
-}
-
-/// The remedy for an indefinite tangent in this iteration.
-fn mend_tangent(iteration: usize) -> &'static str {
-    match iteration {
-        1 => {
-            "nothing has moved yet: check the sign of the tangent with `verify::tangent`; if it is right, take smaller steps"
-        }
-        _ => "the stiffness there is too negative for this step; take smaller steps",
-    }
-}
+mod text;
 
 #[cfg(test)]
 mod page;
 
-pub(crate) use check::{positive, step_size};
+pub(crate) use check::positive;
+pub(crate) use text::few;
 
 use crate::contact_failure::ContactFailure;
 use crate::contact_id::ContactId;
+use text::{bytes_requested, moment, tangent_remedy};
 
 /// What failed, where, and with which numbers.
 ///
@@ -154,12 +128,6 @@ pub enum Error {
         /// The dof.
         dof: usize,
     },
-    /// A degree of freedom is prescribed twice.
-    #[error("dof {dof} is prescribed twice; fix or drive it once")]
-    PrescribedTwice {
-        /// The dof.
-        dof: usize,
-    },
     /// An initial value contradicts the prescribed motion.
     #[error("{what} of dof {dof} starts at {given:e}, but its support prescribes {prescribed:e} at the start time")]
     PrescribedStart {
@@ -256,7 +224,7 @@ pub enum Error {
         "step from t = {t:e} with h = {h:e}: {} than {integrator} takes: the highest frequency is now {frequency:e} \
          (1/time) or more, and h may be about {largest:e}; take smaller steps (`StepControl` does), a softer contact \
          law, or an implicit scheme (`SimulationBuilder::unchecked_stability` takes the step as it is)",
-        .contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer")),
+        stiffer_part(*.contact),
         t = moment(*.t), h = few(*.h), frequency = few(*.frequency), largest = few(*.largest)
     )]
     Stiffened {
@@ -343,7 +311,7 @@ pub enum Error {
         frequency: f64,
     },
     /// A factorization, or the matrices of contact, do not fit into memory or their index range.
-    #[error("no memory for {what}{}", asked(*.bytes))]
+    #[error("no memory for {what}{}", bytes_requested(*.bytes))]
     OutOfMemory {
         /// The data to be allocated.
         what: &'static str,
@@ -474,8 +442,8 @@ pub enum Error {
     /// The row of a contact is not the derivative of its gap, although its constraint reports that rows do not
     /// change.
     #[error(
-        "contact {contact}: between t = {:e} and {:e} displacements change its gap by {:e}, along its row of G by {:e}, \
-         and its constraint says that rows do not change; return `Candidates::Changed` from `search` and `follow` when \
+        "contact {contact}: between t = {:e} and {:e} displacements change its gap by {:e}, along its row of G by \
+         {:e}, and its constraint says that rows do not change; return `Candidates::Changed` from `search` and `follow` when \
          they do, and check them with `verify::gap_jacobian`",
         .t[0], .t[1], .change[0], .change[1]
     )]
@@ -568,7 +536,10 @@ pub enum Error {
         resolution: f64,
     },
     /// A step was rejected at its size and at repeated halves of it, down to the smallest allowed.
-    #[error("step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}", t = moment(*.t), h = few(*.h))]
+    #[error(
+        "step from t = {t:e} refused {attempts} times, last with h = {h:e}, the smallest allowed: {source}",
+        t = moment(*.t), h = few(*.h)
+    )]
     StepRefused {
         /// Time at the start of the step.
         t: f64,
@@ -583,7 +554,7 @@ pub enum Error {
     #[error(
         "step from t = {t:e} with h = {h:e}: the effective matrix of iteration {iteration} is not positive definite \
          at dof {dof}: {}",
-        mend_tangent(*.iteration),
+        tangent_remedy(*.iteration),
         t = moment(*.t), h = few(*.h)
     )]
     IndefiniteTangent {
@@ -609,7 +580,10 @@ pub enum Error {
         value: f64,
     },
     /// An energy or a work is NaN or infinite.
-    #[error("t = {t:e}: {what} is {value}; look at the potential energy, load and damping force of the system", t = moment(*.t))]
+    #[error(
+        "t = {t:e}: {what} is {value}; look at the potential energy, load and damping force of the system",
+        t = moment(*.t)
+    )]
     EnergyNotFinite {
         /// Time of the state.
         t: f64,
@@ -703,6 +677,11 @@ pub enum Error {
         /// The host's own error.
         r#source: Box<dyn std::error::Error + Send + Sync>,
     },
+}
+
+/// The part of a run that has become too stiff for the step size.
+fn stiffer_part(contact: Option<ContactId>) -> String {
+    contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer"))
 }
 
 /// Result with the crate's [`Error`].

@@ -123,3 +123,30 @@ pub(crate) fn largest_compliance<T: Float>() -> T {
     let square = T::epsilon() * T::epsilon();
     (square * square).recip()
 }
+
+// Stability.
+
+/// Relative accuracy of the critical Ω of a scheme, computed in `f64`: its roots are double there, and accurate to the
+/// square root of rounding only.
+pub(crate) const CRITICAL_ACCURACY: f64 = 1e-7;
+
+/// Relative accuracy of the square of the highest frequency if an error names the largest stable step: 0.1 % of h.
+pub(crate) const FREQUENCY_ACCURACY: f64 = 2e-3;
+
+/// Coefficients of a scheme, computed in `f64` from its rows, count as zero below this. Without unit.
+pub(crate) const COEFFICIENT: f64 = 1e-9;
+
+/// Relative error of a stiffness from differences of a force over the share √ε of the displacements: 32 √ε.
+pub(crate) fn difference_error<T: Float>() -> T {
+    number::<T>(32.0) * half_digits()
+}
+
+// Time.
+
+/// Share of the step size within which two times, or two step sizes, count as the same.
+pub(crate) const TIME_SHARE: f64 = 1e-9;
+
+/// The distance between times near t that an `f64` can tell apart.
+pub(crate) fn time_resolution(t: f64) -> f64 {
+    t.abs().next_up() - t.abs()
+}

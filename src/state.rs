@@ -1,4 +1,4 @@
-//! The state of a run: its motion, as stored for later steps and as shown to users, and its contacts.
+//! The state of a run: its motion, as stored for later steps and at the time of the state, and its contacts.
 
 mod backup;
 #[cfg(feature = "serde")]
@@ -16,21 +16,26 @@ mod record;
 pub(crate) use backup::Backup;
 #[cfg(feature = "serde")]
 pub use checkpoint::Checkpoint;
-pub(crate) use clock::{Clock, Pace, Refusal, resolution};
+pub(crate) use clock::{Clock, Pace, Refusal};
 pub(crate) use contacts::Names;
 pub use contacts::{ContactState, ContactStatus};
+pub(crate) use history::ComputedMotions;
 pub use history::History;
-pub(crate) use history::Trail;
 
 use crate::contact::BrokenBond;
 use crate::real::Real;
 
 /// Stored values of one state: displacement, velocity and acceleration at its time.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: Real"))]
 pub(crate) struct Motion<T> {
+    #[cfg_attr(feature = "serde", serde(rename = "time"))]
     pub(crate) t: f64,
+    #[cfg_attr(feature = "serde", serde(rename = "displacement"))]
     pub(crate) u: Vec<T>,
+    #[cfg_attr(feature = "serde", serde(rename = "velocity"))]
     pub(crate) v: Vec<T>,
+    #[cfg_attr(feature = "serde", serde(rename = "acceleration"))]
     pub(crate) a: Vec<T>,
 }
 
@@ -61,12 +66,17 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// Field 1 or 2 (v or a) at the time of the state: `shown`, or the stored values if `shown` is empty.
-    pub(crate) fn shown<'v>(&'v self, shown: &'v [Vec<T>; 2], field: usize) -> &'v [T] {
-        match shown[field - 1].is_empty() {
+    /// Field 1 or 2 (v or a) at the time of the state: `rates`, or the stored values if they are empty.
+    pub(crate) fn rate<'v>(&'v self, rates: &'v [Vec<T>; 2], field: usize) -> &'v [T] {
+        match rates[field - 1].is_empty() {
             true => self.field(field),
-            false => &shown[field - 1],
+            false => &rates[field - 1],
         }
+    }
+
+    /// u, v and a at the time of the state.
+    pub(crate) fn at_state<'v>(&'v self, rates: &'v [Vec<T>; 2]) -> [&'v [T]; 3] {
+        [&self.u, self.rate(rates, 1), self.rate(rates, 2)]
     }
 
     /// Field 0, 1, 2: u, v, a.
@@ -88,7 +98,7 @@ pub struct State<T> {
     /// Values as the scheme stores them.
     pub(crate) motion: Motion<T>,
     /// Velocity and acceleration at the time of the state; empty if the stored ones have that time.
-    pub(crate) shown: [Vec<T>; 2],
+    pub(crate) rates: [Vec<T>; 2],
     pub(crate) contacts: ContactState<T>,
     /// Broken bonds in the order in which they broke.
     pub(crate) broken: Vec<BrokenBond>,
@@ -107,7 +117,7 @@ impl<T: Real> State<T> {
 
     /// Velocities at the time of the state, one per dof.
     pub fn velocity(&self) -> &[T] {
-        self.motion.shown(&self.shown, 1)
+        self.motion.rate(&self.rates, 1)
     }
 
     /// Accelerations at the time of the state, one per dof.
@@ -116,7 +126,7 @@ impl<T: Real> State<T> {
     /// extrapolated from two states, or are the stored ones if a contact closed or opened between the two by more
     /// than rounding.
     pub fn acceleration(&self) -> &[T] {
-        self.motion.shown(&self.shown, 2)
+        self.motion.rate(&self.rates, 2)
     }
 
     /// Velocities as the scheme stores them, at the time defined by its rows.

@@ -220,6 +220,20 @@ pub(crate) fn check_sizes<T: Real>(system: &dyn System<T>) -> Result<usize> {
     Ok(dofs)
 }
 
+/// Rejects step sizes that are not positive and finite, or whose square or its reciprocal the scalar cannot
+/// represent.
+pub(crate) fn check_step_size<T: Real>(h: f64) -> Result<()> {
+    let fits = |x: f64| T::of(x).is_normal();
+    match h > 0.0 && h.is_finite() && fits(h * h) && fits(1.0 / (h * h)) {
+        true => Ok(()),
+        false => Err(Error::Parameter {
+            name: "the step size h",
+            value: h,
+            range: "positive and finite, with h² and 1/h² in the range of the scalar; choose another unit of time",
+        }),
+    }
+}
+
 /// Pointers to systems are systems: `&mut S` lends the host's model, `Box<dyn System<T>>` allows a choice at run
 /// time.
 macro_rules! forward {

@@ -93,7 +93,7 @@ impl Modes {
     /// # Errors
     ///
     /// [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`], [`Error::Mass`] for M and K;
-    /// [`Error::MissingDof`], [`Error::PrescribedTwice`] and [`Error::Empty`] for the supports; [`Error::Parameter`]
+    /// [`Error::MissingDof`], [`Error::RepeatedDof`] and [`Error::Empty`] for the supports; [`Error::Parameter`]
     /// for a `count` that is zero, less than there are rigid motions or more than there are free dofs with mass, and
     /// for an eigenvalue that is negative; [`Error::Singular`] for a K that is not semidefinite, or a part with neither
     /// mass nor stiffness; [`Error::ModeResidual`], [`Error::ModesMissed`] if modes are not found to rounding;

@@ -67,7 +67,7 @@ pub(super) fn free_dofs(dofs: usize, fixed: &[usize]) -> Result<Vec<usize>> {
             return Err(Error::MissingDof { what: "a support", dof, dofs });
         }
         if !std::mem::replace(&mut free[dof], false) {
-            return Err(Error::PrescribedTwice { dof });
+            return Err(Error::RepeatedDof { what: "the list of supports", dof });
         }
     }
     let free: Vec<usize> = (0..dofs).filter(|&dof| free[dof]).collect();

@@ -6,11 +6,12 @@ use crate::contact::{ContactConstraint, LinearRows};
 use crate::contact_id::ContactId;
 use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, contact_error};
 use crate::dense::{DenseCholesky, dot};
-use crate::error::{Error, Result, step_size};
+use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 use crate::rounding::{half_digits, rounding};
 use crate::sparse::check_vector;
+use crate::system::check_step_size;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -209,7 +210,7 @@ impl<'a, T: Real> ModalPropagationBuilder<'a, T> {
     /// bonds, and for a solver that does not support the rows; [`Error::Dimension`] and [`Error::NotFinite`] for
     /// displacements, velocities and loads; contact errors as in a [`step`](ModalPropagation::step).
     pub fn build(self) -> Result<ModalPropagation<'a, T>> {
-        step_size::<T>(self.h)?;
+        check_step_size::<T>(self.h)?;
         if self.bodies.is_empty() {
             return Err(Error::Empty { what: "the list of reduced bodies", remedy: "give at least one" });
         }

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::linear_solver::LinearSolver;
 use crate::ranks::Together;
 use crate::real::Real;
-use crate::simulation::build::program::Program;
+use crate::simulation::build::program::Compiled;
 use crate::simulation::build::scheme::Scheme;
 use crate::simulation::build::workspace::Workspace;
 use crate::simulation::operator::Operator;
@@ -51,38 +51,49 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Simulation<'a, T: Real> {
-    pub(crate) system: Box<dyn System<T> + 'a>,
+    pub(crate) parts: Parts<'a, T>,
     pub(crate) constraints: Constraints<'a, T>,
     /// The rows of G of all constraints.
     pub(crate) g: ContactJacobian<T>,
-    pub(crate) contact_solver: Box<dyn ContactSolver<T> + 'a>,
-    pub(crate) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
-    pub(crate) linear_solver: Box<dyn LinearSolver<T> + 'a>,
-    pub(crate) together: Together<T>,
     pub(crate) scheme: Scheme<'a>,
-    pub(crate) program: Program<T>,
-    pub(crate) limit: StepLimit,
-    /// The one-step scheme of the first steps; none once the past is known.
-    pub(crate) startup: Option<Program<T>>,
+    pub(crate) compiled: Compiled<T>,
     pub(crate) state: State<T>,
     pub(crate) history: History<T>,
     pub(crate) work: Workspace<T>,
-    pub(crate) ledger: Option<Box<Ledger<T>>>,
-    /// For runs that control their step size.
-    pub(crate) judge: Option<Judge<T>>,
+    pub(crate) monitors: Monitors<T>,
     pub(crate) adjustment: Option<StartAdjustment<T>>,
     pub(crate) statistics: Statistics,
     /// Whether a callback of the host has panicked.
     pub(crate) poisoned: bool,
 }
 
+/// The parts of a run that the caller chooses.
+pub(crate) struct Parts<'a, T: Real> {
+    pub(crate) system: Box<dyn System<T> + 'a>,
+    pub(crate) contact_solver: Box<dyn ContactSolver<T> + 'a>,
+    pub(crate) correctors: Vec<Box<dyn Corrector<T> + 'a>>,
+    pub(crate) linear_solver: Box<dyn LinearSolver<T> + 'a>,
+    /// The ranks of the system.
+    pub(crate) together: Together<T>,
+}
+
+/// Monitors of the steps.
+pub(crate) struct Monitors<T: Real> {
+    /// The largest step size known to be stable.
+    pub(crate) limit: StepLimit,
+    /// The energy balance, if the caller has requested it.
+    pub(crate) ledger: Option<Box<Ledger<T>>>,
+    /// For runs that control their step size.
+    pub(crate) judge: Option<Judge<T>>,
+}
+
 impl<T: Real> std::fmt::Debug for Simulation<'_, T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Simulation")
             .field("integrator", &self.scheme.integrator.name())
-            .field("dofs", &self.system.dofs())
+            .field("dofs", &self.parts.system.dofs())
             .field("constraints", &self.constraints)
-            .field("correctors", &self.correctors)
+            .field("correctors", &self.parts.correctors)
             .field("time", &self.state.motion.t)
             .field("statistics", &self.statistics)
             .finish_non_exhaustive()
@@ -128,12 +139,12 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Number of scalars in the factors of the effective matrices.
     pub fn factor_size(&self) -> usize {
-        self.program.operators.iter().map(Operator::stored_values).sum()
+        self.compiled.program.operators.iter().map(Operator::stored_values).sum()
     }
 
     /// The system.
     pub fn system(&self) -> &dyn System<T> {
-        &*self.system
+        &*self.parts.system
     }
 
     /// A contact constraint, by its index in the order in which they were given: the first number of a
@@ -174,15 +185,41 @@ impl<T: Real> Simulation<'_, T> {
     /// [`Error::Dimension`] if the direction has the wrong length.
     pub fn momentum(&self, direction: &[T]) -> Result<T> {
         self.check_sound()?;
-        let dofs = self.system.dofs();
+        let dofs = self.parts.system.dofs();
         if direction.len() != dofs {
             return Err(Error::Dimension { what: "the direction", expected: dofs, found: direction.len() });
         }
         let history = &self.history;
         let sum = self.scheme.momentum(&self.state.motion, &history.slots[1..history.known], history.clock.h);
         let mut product = vec![T::zero(); dofs];
-        self.system.mass().add_product(T::one(), &sum, &mut product);
-        self.together.dot(&product, direction)
+        self.parts.system.mass().add_product(T::one(), &sum, &mut product);
+        self.parts.together.dot(&product, direction)
+    }
+
+    /// The impulses of all contacts on each dof (force × time), friction and corrections included, in the last step
+    /// that this simulation has made; empty without constraints.
+    ///
+    /// Their sum over the dofs of a body along a direction is the impulse of contact on that body: under no other
+    /// force along that direction it is the change of the body's [`momentum`](Self::momentum), to rounding. Over two
+    /// bodies that touch only each other the sum is zero.
+    ///
+    /// ```
+    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+    /// use contact_dynamics::{Composite, LinearRows, LinearSystem, Simulation};
+    ///
+    /// // Two free masses, of which the first runs into the second with speed 2.
+    /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
+    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
+    /// let system = LinearSystem::lumped(vec![1.0; 2], free)?;
+    /// let gap = LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.05);
+    /// let mut run = Simulation::builder(system, Composite, 0.1).velocity(vec![2.0, 0.0]).constraint(gap).build()?;
+    /// run.step()?;
+    /// let [first, second] = run.impulses_on_dofs() else { panic!("two dofs") };
+    /// assert!((first + 1.0).abs() < 1e-12 && (second - 1.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn impulses_on_dofs(&self) -> &[T] {
+        self.work.contact.impulses.last()
     }
 
     /// Refuses calls after a panic of the host.
@@ -194,7 +231,7 @@ impl<T: Real> Simulation<'_, T> {
     /// the panic continues, and later calls are refused.
     pub(crate) fn guarded<R>(&mut self, call: impl FnOnce(&mut Self) -> Result<R>) -> Result<R> {
         self.check_sound()?;
-        // Unwind safe: state and history are restored below, and nothing else can be used after a panic.
+        // Unwind safe: state and history are restored below, and later calls are refused.
         match catch_unwind(AssertUnwindSafe(|| call(self))) {
             Ok(result) => result,
             Err(panic) => {
@@ -203,7 +240,7 @@ impl<T: Real> Simulation<'_, T> {
                     self.put_back();
                 }
                 // The others do not wait for a rank that has panicked.
-                self.together.finish::<()>(Err(Error::Poisoned)).ok();
+                self.parts.together.finish::<()>(Err(Error::Poisoned)).ok();
                 resume_unwind(panic)
             }
         }
@@ -222,7 +259,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Takes `&mut self`, as [`reactions`](Self::reactions) does, because the host evaluates its energy and its
     /// forces with memory of its own ([`System::potential_energy`], [`System::force`]). The run does not change.
     pub fn energy(&mut self) -> Energy<T> {
-        energy::energy(&mut *self.system, &self.together, &self.state, self.ledger.as_deref())
+        energy::energy(&mut *self.parts.system, &self.parts.together, &self.state, self.monitors.ledger.as_deref())
     }
 
     /// Forces of the supports on the system, one a prescribed dof: R = M a − f(t, u, v) − Gᵀ λ.
@@ -232,7 +269,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Errors of the host.
     pub fn reactions(&mut self) -> Result<Vec<T>> {
         self.check_sound()?;
-        let reactions = energy::reactions(&mut *self.system, &self.state, (&self.constraints, &self.g));
-        self.together.finish(reactions)
+        let reactions = energy::reactions(&mut *self.parts.system, &self.state, (&self.constraints, &self.g));
+        self.parts.together.finish(reactions)
     }
 }

@@ -37,7 +37,7 @@ use crate::simulation::start::problem::{StartImpact, StartProblem, sliding, stop
 use crate::simulation::start::rate_check::RateCheck;
 use crate::simulation::step::finite::check_state;
 use crate::sparse::scattered_signed;
-use crate::state::{Clock, ContactState, History, Motion, Pace, State, Trail};
+use crate::state::{Clock, ComputedMotions, ContactState, History, Motion, Pace, State};
 use crate::system::System;
 use crate::tableau::StartUp;
 
@@ -158,7 +158,7 @@ impl<T: Real> Start<'_, T> {
         } else {
             1
         };
-        let shown = scheme.shown(&motion);
+        let rates = scheme.rates(&motion);
         // A scheme that stores the velocity at another time gets the velocity at that time. The acceleration is left
         // at the start: its rate is unknown, and an estimate would be dominated by the stiffest mode.
         let Motion { v, a, .. } = &mut motion;
@@ -171,13 +171,13 @@ impl<T: Real> Start<'_, T> {
             clock,
             pace: Pace::new(h),
             made_with: h,
-            trail: Trail::default(),
-            unmoved: [Vec::new(), Vec::new()],
+            computed: ComputedMotions::default(),
+            unshifted: [Vec::new(), Vec::new()],
             slopes: self.massless.iter().map(|&dof| motion.v[dof]).collect(),
             scheme: scheme.integrator.name(),
             overclosures: constraints.overclosures().cloned(),
         };
-        let state = State { motion, shown, contacts, broken: Vec::new() };
+        let state = State { motion, rates, contacts, broken: Vec::new() };
         check_state(h, &state)?;
         Ok(Begun { state, history, adjustment })
     }

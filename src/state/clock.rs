@@ -3,6 +3,7 @@
 #[cfg(feature = "serde")]
 use super::read::{COUNT, count, number};
 use crate::error::{Error, Result};
+use crate::rounding::{TIME_SHARE, time_resolution};
 
 /// Time as origin + elapsed + k h, so that it does not drift. The elapsed time is a sum of step sizes that is not
 /// rounded by the origin: runs are the same for any start time.
@@ -44,15 +45,15 @@ impl Clock {
 
     /// Whether t is reached, within 1e-9 h and the rounding of t.
     pub(crate) fn has_reached(&self, t: f64) -> bool {
-        t - self.at(0.0) <= 1e-9 * self.h + resolution(t).min(0.5 * self.h)
+        t - self.at(0.0) <= TIME_SHARE * self.h + time_resolution(t).min(0.5 * self.h)
     }
 
     /// Rejects a step size that does not change the time: host functions of time would not advance with the motion.
     pub(crate) fn check(&self) -> Result<()> {
         let (t, h) = (self.at(0.0), self.h);
-        match h >= resolution(t) {
+        match h >= time_resolution(t) {
             true => Ok(()),
-            false => Err(Error::TimeNotAdvancing { t, h, resolution: resolution(t) }),
+            false => Err(Error::TimeNotAdvancing { t, h, resolution: time_resolution(t) }),
         }
     }
 }
@@ -69,11 +70,6 @@ impl Clock {
         count("the number of steps of a checkpoint", steps, 0..=COUNT)?;
         number("the time of a checkpoint", self.at(0.0), "finite", f64::is_finite)
     }
-}
-
-/// The distance between times near t that an `f64` can tell apart.
-pub(crate) fn resolution(t: f64) -> f64 {
-    t.abs().next_up() - t.abs()
 }
 
 /// Position of the present step size in the nominal grid, for runs that control it.
@@ -102,8 +98,8 @@ pub(crate) struct Pace {
 /// Why a step was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// A temporary cause.
-    Passing,
+    /// A cause that later steps may not have.
+    Temporary,
     /// The system is too stiff for the step size.
     StiffSystem,
     /// A contact is too stiff for the step size.
@@ -155,7 +151,7 @@ impl Pace {
         (self.level, self.position) = (self.level + 1, self.position.saturating_mul(2));
         (self.steps, self.grown) = (0, false);
         match refusal {
-            Refusal::Passing => {}
+            Refusal::Temporary => {}
             Refusal::StiffSystem => self.kept[0] = self.level,
             Refusal::StiffContact => self.kept[1] = self.level,
         }
@@ -202,19 +198,19 @@ mod tests {
     #[test]
     fn growth_that_is_refused_at_once_waits_twice_as_long_each_time() {
         let mut pace = Pace::new(1.0);
-        pace.halve(Refusal::Passing);
+        pace.halve(Refusal::Temporary);
         let mut waits = Vec::new();
         for _ in 0..8 {
             waits.push(wait(&mut pace));
             pace.double();
-            pace.halve(Refusal::Passing);
+            pace.halve(Refusal::Temporary);
         }
         assert_eq!(waits, [2, 4, 8, 16, 32, 64, 64, 64]);
         // After one good step following growth the wait is reset.
         wait(&mut pace);
         pace.double();
         pace.advance(|| false);
-        pace.halve(Refusal::Passing);
+        pace.halve(Refusal::Temporary);
         assert_eq!(wait(&mut pace), 2);
     }
 }

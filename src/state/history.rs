@@ -20,10 +20,10 @@ pub struct History<T> {
     /// Step size that led to the current state.
     pub(crate) made_with: f64,
     /// The computed motions, from which changes of the step size resample; empty until it first changes.
-    pub(crate) trail: Trail<T>,
+    pub(crate) computed: ComputedMotions<T>,
     /// v and a of the current state as computed, if a change of the step size has moved the stored ones to another
     /// time.
-    pub(crate) unmoved: [Vec<T>; 2],
+    pub(crate) unshifted: [Vec<T>; 2],
     /// (u_n − u_{n−1})/h on the dofs without mass: their velocity is a difference over two steps.
     pub(crate) slopes: Vec<T>,
     /// Name of the integrator: another one would interpret the same states differently.
@@ -34,28 +34,28 @@ pub struct History<T> {
 
 /// Motions before the current one as computed, newest first, with any spacing.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Trail<T> {
+pub(crate) struct ComputedMotions<T> {
     /// Each motion with the step size that led to it; entries beyond `known` are spare.
     states: Vec<(Motion<T>, f64)>,
     known: usize,
 }
 
-impl<T: Real> Trail<T> {
+impl<T: Real> ComputedMotions<T> {
     /// Memory for `length` states, the newest of which are `known`.
     pub(crate) fn new(length: usize, dofs: usize, known: &[(&Motion<T>, f64)]) -> Self {
-        let mut trail = Self { states: vec![(Motion::zero(dofs), 0.0); length], known: 0 };
+        let mut computed = Self { states: vec![(Motion::zero(dofs), 0.0); length], known: 0 };
         for (motion, h) in known.iter().rev() {
-            trail.push(motion, *h);
+            computed.push(motion, *h);
         }
-        trail
+        computed
     }
 
     /// Memory for `length` states, of which these are known.
     #[cfg(feature = "serde")]
     pub(super) fn of(known: Vec<(Motion<T>, f64)>, length: usize, dofs: usize) -> Self {
-        let mut trail = Self { known: known.len(), states: known };
-        trail.states.resize_with(length, || (Motion::zero(dofs), 0.0));
-        trail
+        let mut computed = Self { known: known.len(), states: known };
+        computed.states.resize_with(length, || (Motion::zero(dofs), 0.0));
+        computed
     }
 
     /// Capacity in states.
@@ -118,6 +118,32 @@ impl<T: Real> History<T> {
     pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
         let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
         Some((&motion.u, &motion.v, &motion.a))
+    }
+
+    /// The motion of the stage that is being solved, and the states before it.
+    pub(crate) fn new_and_past(&self) -> (&Motion<T>, &[Motion<T>]) {
+        (&self.slots[0], &self.slots[1..])
+    }
+
+    /// Adds the state before an accepted step, in slot 1, to the past of a scheme that reads `depth` states; `u` are
+    /// the displacements at the end of the step. `jumps`: the motion is not smooth in the step.
+    pub(crate) fn extend(&mut self, u: &[T], massless: &[usize], depth: usize, jumps: bool) {
+        self.known = (self.known + 1).min(depth);
+        self.smooth = if jumps { 1 } else { self.smooth + 1 };
+        if !self.computed.is_empty() {
+            self.computed.push(&self.slots[1], self.made_with);
+            for (field, unshifted) in (1..).zip(&mut self.unshifted) {
+                if let Some(front) = self.computed.front().filter(|_| !unshifted.is_empty()) {
+                    std::mem::swap(front.rate_mut(field), unshifted);
+                    unshifted.clear();
+                }
+            }
+        }
+        for (slope, &dof) in self.slopes.iter_mut().zip(massless) {
+            *slope = (u[dof] - self.slots[1].u[dof]) / T::of(self.clock.h);
+        }
+        self.made_with = self.clock.h;
+        self.clock.steps += 1;
     }
 
     /// Rejects a history that does not fit a system of this size, with `slots` motions and `massless` dofs without

@@ -86,8 +86,8 @@ impl<T: Real> Checkpoint<T> {
     /// Whether another part can belong to the same run at the same instant.
     fn is_alike(&self, other: &Self) -> bool {
         let shape = |part: &Self| {
-            let History { slots, known, smooth, clock, made_with, trail, unmoved, scheme, .. } = &part.history;
-            let lists = (slots.len(), trail.known().count(), unmoved.each_ref().map(Vec::is_empty));
+            let History { slots, known, smooth, clock, made_with, computed, unshifted, scheme, .. } = &part.history;
+            let lists = (slots.len(), computed.known().count(), unshifted.each_ref().map(Vec::is_empty));
             (lists, *known, *smooth, *clock, made_with.to_bits(), scheme.clone())
         };
         shape(self) == shape(other)
@@ -109,9 +109,9 @@ impl<T: Real> Checkpoint<T> {
     /// All vectors with one entry per dof, in a fixed order.
     fn vectors(&mut self) -> impl Iterator<Item = &mut Vec<T>> {
         let (state, history) = (&mut self.state, &mut self.history);
-        let motions = std::iter::once(&mut state.motion).chain(&mut history.slots).chain(history.trail.all());
+        let motions = std::iter::once(&mut state.motion).chain(&mut history.slots).chain(history.computed.all());
         let fields = motions.flat_map(|motion| [&mut motion.u, &mut motion.v, &mut motion.a]);
-        let others = state.shown.iter_mut().chain(&mut history.unmoved).filter(|values| !values.is_empty());
+        let others = state.rates.iter_mut().chain(&mut history.unshifted).filter(|values| !values.is_empty());
         fields.chain(others)
     }
 }

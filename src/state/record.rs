@@ -2,7 +2,7 @@
 
 use super::clock::{Clock, Pace};
 use super::contacts::{ContactState, Names};
-use super::history::{History, Trail};
+use super::history::{ComputedMotions, History};
 use super::read::{COUNT, count, length, number, optional, vector};
 use super::{Motion, State};
 use crate::contact::{BrokenBond, Tangents};
@@ -36,17 +36,8 @@ pub(super) struct Record<'r, T: Real> {
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "T: Real")]
-struct MotionRecord<'r, T: Real> {
-    time: f64,
-    displacement: Cow<'r, [T]>,
-    velocity: Cow<'r, [T]>,
-    acceleration: Cow<'r, [T]>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "T: Real")]
 struct StateRecord<'r, T: Real> {
-    motion: MotionRecord<'r, T>,
+    motion: Cow<'r, Motion<T>>,
     /// v and a at the time of the state, if the stored ones have another time.
     shown: [Cow<'r, [T]>; 2],
     contacts: ContactsRecord<'r, T>,
@@ -76,7 +67,7 @@ struct ContactsRecord<'r, T: Real> {
 #[serde(bound = "T: Real")]
 struct HistoryRecord<'r, T: Real> {
     /// Past states 1, 2, …, as far as they are read.
-    past: Vec<MotionRecord<'r, T>>,
+    past: Vec<Cow<'r, Motion<T>>>,
     known: usize,
     smooth: usize,
     clock: Clock,
@@ -84,7 +75,7 @@ struct HistoryRecord<'r, T: Real> {
     made_with: f64,
     /// Length of the trail, 0 if there is none, and its known motions with the step sizes that led to them.
     trail_room: usize,
-    trail: Vec<(MotionRecord<'r, T>, f64)>,
+    trail: Vec<(Cow<'r, Motion<T>>, f64)>,
     unmoved: [Cow<'r, [T]>; 2],
     slopes: Cow<'r, [T]>,
     overclosures: Cow<'r, Option<Overclosures<T>>>,
@@ -139,16 +130,15 @@ impl<T: Real> TryFrom<String> for ScalarName<T> {
 
 impl<'r, T: Real> Record<'r, T> {
     pub(super) fn of(state: &'r State<T>, history: &'r History<T>, rows: u32) -> Self {
-        let State { motion, shown, contacts, broken } = state;
-        let motion = MotionRecord::of(motion);
+        let State { motion, rates, contacts, broken } = state;
         Self {
             format: Format,
             scalar: ScalarName(PhantomData),
             scheme: (&history.scheme).into(),
             rows,
             state: StateRecord {
-                motion,
-                shown: both(shown),
+                motion: Cow::Borrowed(motion),
+                shown: both(rates),
                 contacts: ContactsRecord::of(contacts),
                 broken_bonds: broken.into(),
             },
@@ -160,38 +150,32 @@ impl<'r, T: Real> Record<'r, T> {
     pub(super) fn checked(self) -> Result<(State<T>, History<T>, u32)> {
         let Self { format: _, scalar: _, scheme, rows, state, history } = self;
         let StateRecord { motion, shown, contacts, broken_bonds } = state;
-        let dofs = motion.displacement.len();
-        let motion = motion.checked(dofs)?;
+        let dofs = motion.u.len();
+        let motion = checked(motion, dofs)?;
         let [v, a] = shown;
-        let shown = [optional("a velocity shown", v, dofs)?, optional("an acceleration shown", a, dofs)?];
+        let rates = [optional("a velocity shown", v, dofs)?, optional("an acceleration shown", a, dofs)?];
         let contacts = contacts.checked()?;
         let broken = broken_bonds.into_owned();
         for bond in &broken {
             number("the time at which a bond of a checkpoint broke", bond.time, "finite", f64::is_finite)?;
             number("the load of a broken bond of a checkpoint", bond.load, "1 or more", |load| load >= 1.0)?;
         }
-        let state = State { motion, shown, contacts, broken };
+        let state = State { motion, rates, contacts, broken };
         let history = history.checked(scheme.into_owned(), dofs, is_shifted(&state))?;
         Ok((state, history, rows))
     }
 }
 
-impl<'r, T: Real> MotionRecord<'r, T> {
-    fn of(motion: &'r Motion<T>) -> Self {
-        let Motion { t, u, v, a } = motion;
-        Self { time: *t, displacement: u.into(), velocity: v.into(), acceleration: a.into() }
-    }
-
-    fn checked(self, dofs: usize) -> Result<Motion<T>> {
-        let Self { time, displacement, velocity, acceleration } = self;
-        number("a time of a checkpoint", time, "finite", f64::is_finite)?;
-        Ok(Motion {
-            t: time,
-            u: vector("a displacement of a checkpoint", displacement, dofs)?,
-            v: vector("a velocity of a checkpoint", velocity, dofs)?,
-            a: vector("an acceleration of a checkpoint", acceleration, dofs)?,
-        })
-    }
+/// A motion as read, if its numbers are finite and its vectors have one entry a dof.
+fn checked<T: Real>(motion: Cow<'_, Motion<T>>, dofs: usize) -> Result<Motion<T>> {
+    let Motion { t, u, v, a } = motion.into_owned();
+    number("a time of a checkpoint", t, "finite", f64::is_finite)?;
+    Ok(Motion {
+        t,
+        u: vector("a displacement of a checkpoint", u.into(), dofs)?,
+        v: vector("a velocity of a checkpoint", v.into(), dofs)?,
+        a: vector("an acceleration of a checkpoint", a.into(), dofs)?,
+    })
 }
 
 impl<'r, T: Real> ContactsRecord<'r, T> {
@@ -265,7 +249,7 @@ fn tangents(friction: &[(usize, f64, usize)], n: usize) -> Result<Tangents> {
 
 /// Whether the scheme stores v or a at another time than the time of the state.
 fn is_shifted<T: Real>(state: &State<T>) -> bool {
-    state.shown.iter().any(|shown| !shown.is_empty())
+    state.rates.iter().any(|rate| !rate.is_empty())
 }
 
 /// Number of past states that steps and changes of the step size read, given the numbers of known and smooth states.
@@ -279,15 +263,15 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
     fn of(history: &'r History<T>, shifted: bool) -> Self {
         let past = history.slots.iter().skip(1).take(read(history.known, history.smooth, shifted));
         Self {
-            past: past.map(MotionRecord::of).collect(),
+            past: past.map(Cow::Borrowed).collect(),
             known: history.known,
             smooth: history.smooth,
             clock: history.clock,
             pace: history.pace,
             made_with: history.made_with,
-            trail_room: history.trail.room(),
-            trail: history.trail.known().map(|(motion, h)| (MotionRecord::of(motion), h)).collect(),
-            unmoved: both(&history.unmoved),
+            trail_room: history.computed.room(),
+            trail: history.computed.known().map(|(motion, h)| (Cow::Borrowed(motion), h)).collect(),
+            unmoved: both(&history.unshifted),
             slopes: (&history.slopes).into(),
             overclosures: Cow::Borrowed(&history.overclosures),
         }
@@ -303,20 +287,20 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
         pace.check_read(clock.h)?;
         let size = |h| number("a step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite());
         size(made_with)?;
-        // No scheme keeps more; see `keep_trail`.
+        // No scheme keeps more; see `keep_computed`.
         count("the length of the trail of a checkpoint", trail_room as u64, 0..=3 * MAX_PAST as u64)?;
         count("the known length of the trail of a checkpoint", trail.len() as u64, 0..=trail_room as u64)?;
         let mut slots = vec![Motion::zero(dofs)];
         for motion in past {
-            slots.push(motion.checked(dofs)?);
+            slots.push(checked(motion, dofs)?);
         }
         let mut computed = Vec::with_capacity(trail_room);
         for (motion, h) in trail {
             size(h)?;
-            computed.push((motion.checked(dofs)?, h));
+            computed.push((checked(motion, dofs)?, h));
         }
         let [v, a] = unmoved;
-        let unmoved = [optional("an unmoved velocity", v, dofs)?, optional("an unmoved acceleration", a, dofs)?];
+        let unshifted = [optional("an unmoved velocity", v, dofs)?, optional("an unmoved acceleration", a, dofs)?];
         let massless = slopes.len();
         let overclosures = overclosures.into_owned();
         if let Some(overclosures) = &overclosures {
@@ -329,8 +313,8 @@ impl<'r, T: Real> HistoryRecord<'r, T> {
             clock,
             pace,
             made_with,
-            trail: Trail::of(computed, trail_room, dofs),
-            unmoved,
+            computed: ComputedMotions::of(computed, trail_room, dofs),
+            unshifted,
             slopes: vector("the slopes of a checkpoint", slopes, massless)?,
             scheme,
             overclosures,

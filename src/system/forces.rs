@@ -89,7 +89,7 @@ impl<'a, T> Path<'a, T> {
 ///     .energy_balance()
 ///     .build()?;
 /// run.run_until(2.0, &mut ())?;
-/// // What the dashpot took is all that is missing.
+/// // The dashpot has dissipated the missing energy.
 /// let works = run.energy().works.ok_or("a balance was asked for")?;
 /// assert!(works.damping < -0.5 && works.remainder.abs() < 1e-5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

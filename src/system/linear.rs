@@ -237,7 +237,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    /// [`Error::MissingDof`], [`Error::RepeatedDof`].
     pub fn fix(self, dof: usize) -> Result<Self> {
         self.prescribe(dof, None)
     }
@@ -247,7 +247,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    /// [`Error::MissingDof`], [`Error::RepeatedDof`].
     pub fn drive(self, dof: usize, mut motion: impl FnMut(f64) -> [T; 3] + Send + 'a) -> Result<Self> {
         self.try_drive(dof, move |t| Ok(motion(t)))
     }
@@ -257,7 +257,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingDof`], [`Error::PrescribedTwice`].
+    /// [`Error::MissingDof`], [`Error::RepeatedDof`].
     pub fn try_drive(self, dof: usize, motion: impl FnMut(f64) -> Result<[T; 3]> + Send + 'a) -> Result<Self> {
         self.prescribe(dof, Some(Box::new(motion)))
     }
@@ -268,7 +268,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             return Err(Error::MissingDof { what: "a support", dof, dofs });
         }
         match self.prescribed.binary_search(&dof) {
-            Ok(_) => Err(Error::PrescribedTwice { dof }),
+            Ok(_) => Err(Error::RepeatedDof { what: "the list of supports", dof }),
             Err(at) => {
                 self.prescribed.insert(at, dof);
                 self.motions.insert(at, motion);

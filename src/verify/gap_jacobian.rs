@@ -3,7 +3,7 @@
 use crate::contact::{Candidates, ContactConstraint, Contacts, GapRates, Rates};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::state::resolution;
+use crate::rounding::time_resolution;
 
 /// Errors of the rows of a constraint as derivatives of its gaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,7 +95,7 @@ pub fn gap_jacobian<T: Real>(
     let speed = v.iter().fold(0.0, |m: f64, v| m.max(v.value().abs()));
     let delay = if speed > 0.0 { step / speed } else { step };
     // Rounded to the resolution of times near t, so that t ± delay and t ± 100 delay are exact.
-    let delay = (t + delay.max(resolution(t))) - t;
+    let delay = (t + delay.max(time_resolution(t))) - t;
     let (mut before, mut after) = (vec![T::zero(); rows], vec![T::zero(); rows]);
     let mut rates = vec![GapRates::default(); rows];
     let given = rows > 0 && constraint.rates(t, u, v, &mut rates)? != Rates::Differences;

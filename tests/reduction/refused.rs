@@ -34,7 +34,7 @@ fn matrices_and_supports() {
     assert_refused!(lowest(&negative, &k, &[]), Error::Mass { dof: 3, .. });
     assert_refused!(lowest(&diagonal(&[0.0; 6]), &k, &[]), Error::Mass { .. });
     assert_refused!(lowest(&m, &k, &[6]), Error::MissingDof { dof: 6, dofs: 6, .. });
-    assert_refused!(lowest(&m, &k, &[1, 1]), Error::PrescribedTwice { dof: 1 });
+    assert_refused!(lowest(&m, &k, &[1, 1]), Error::RepeatedDof { dof: 1, .. });
     assert_refused!(lowest(&m, &k, &[0, 1, 2, 3, 4, 5]), Error::Empty { .. });
     // A spring that pushes, and a dof with neither mass nor spring.
     let pushing = matrix(6, springs(6, 1.0).chain(spring(2, 3, -1.5)));

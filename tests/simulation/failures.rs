@@ -192,7 +192,7 @@ fn parameters_outside_their_range_are_refused() {
 fn empty_and_misplaced_parts_are_refused() {
     refused!(LinearSystem::<f64>::lumped(vec![], matrix(0, [])), Error::Empty { what: "the system", .. }, "dof");
     refused!(system().fix(2), Error::MissingDof { dof: 2, dofs: 2, .. }, "support");
-    refused!(system().fix(1).unwrap().drive(1, |_| [0.0; 3]), Error::PrescribedTwice { dof: 1 }, "twice");
+    refused!(system().fix(1).unwrap().drive(1, |_| [0.0; 3]), Error::RepeatedDof { dof: 1, .. }, "supports", "once");
     let rows = LinearRows::new().unilateral(&[(0, 1.0)], 1.0).unilateral(&[(0, 1.0), (9, -1.0)], 1.0);
     refused!(
         builder().constraint(rows).build(),

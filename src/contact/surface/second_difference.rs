@@ -2,7 +2,7 @@
 
 use super::{Nodes, Point, add_scaled, norm};
 use crate::real::Real;
-use crate::state::resolution;
+use crate::rounding::time_resolution;
 
 /// Time increment of the differences, as a share of the time ahead, as in `simulation/rows/rate_differences.rs` for
 /// `f64`.
@@ -42,7 +42,7 @@ impl SecondDifference {
             (false, false) => 0.0,
         };
         // A time increment that is exact in t.
-        let delta = (t + step.max(resolution(t))) - t;
+        let delta = (t + step.max(time_resolution(t))) - t;
         let mut size = 0.0_f64;
         for (s, list) in [-delta, 0.0, delta].into_iter().zip(&mut self.gaps) {
             self.positions.resize(nodes.coordinates.len(), [0.0; 3]);

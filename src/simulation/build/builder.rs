@@ -7,24 +7,24 @@ use crate::contact::ContactLaw;
 use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
 use crate::corrector::Corrector;
-use crate::error::{Error, Result, step_size};
+use crate::error::{Error, Result, positive};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
 use crate::mass;
 use crate::ranks::{AgreedSolver, AgreedSystem, Together, check_alike, check_interface, check_owned};
 use crate::real::Real;
-use crate::simulation::build::admitted::admitted;
+use crate::simulation::build::law_support::{LawSupport, ListedCorrector};
 use crate::simulation::build::pairing::{
     check_corrections, check_lagged_damping, check_massless, check_path, default_corrections, local_error,
 };
-use crate::simulation::build::program::{Compiler, Program};
+use crate::simulation::build::program::{Compiled, Compiler, Program};
 use crate::simulation::build::scheme::Scheme;
 use crate::simulation::build::workspace::{ContactSize, Workspace};
 use crate::simulation::operator::responses::Unit;
 use crate::simulation::operator::tangent::At;
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::run::Simulation;
 use crate::simulation::run::results::Statistics;
+use crate::simulation::run::{Monitors, Parts, Simulation};
 use crate::simulation::stage::newton::{Newton, NewtonWork};
 use crate::simulation::stage::path::PathWork;
 use crate::simulation::stage::supports::put_initial_supports;
@@ -37,7 +37,7 @@ use crate::simulation::watch::energy::Ledger;
 use crate::simulation::watch::stability::{self, StepLimit};
 use crate::simulation::watch::stiffening::Stiffening;
 use crate::state::{Clock, History, Motion, State};
-use crate::system::{self, Linearity, System, check_vector};
+use crate::system::{self, Linearity, System, check_step_size, check_vector};
 use crate::tableau::StartUp;
 
 /// Collects the parts of a [`Simulation`]; [`build`](Self::build) checks them together.
@@ -45,43 +45,35 @@ pub struct SimulationBuilder<'a, T: Real> {
     system: Box<dyn System<T> + 'a>,
     integrator: Box<dyn TimeIntegrator + 'a>,
     h: f64,
-    t: f64,
-    u: Option<Vec<T>>,
-    v: Option<Vec<T>>,
     constraints: Vec<Box<dyn ContactConstraint<T> + 'a>>,
     contact_solver: Box<dyn ContactSolver<T> + 'a>,
     correctors: Vec<Box<dyn Corrector<T> + 'a>>,
-    correction: DefaultCorrection,
+    /// Whether the default correctors are added.
+    corrects_by_default: bool,
     linear_solver: Box<dyn LinearSolver<T> + 'a>,
-    start_up: StartUp,
-    newton: Option<Newton>,
-    control: Option<StepControl>,
+    initial: InitialState<T>,
     pub(crate) resumed: Option<Resumed<T>>,
-    balance: EnergyBalance,
-    stability: Stability,
+    settings: Settings,
+}
+
+/// The state from which a run starts.
+struct InitialState<T> {
+    t: f64,
+    u: Option<Vec<T>>,
+    v: Option<Vec<T>>,
     overclosure: InitialOverclosure,
     balanced: Balanced,
 }
 
-/// Whether the default corrector is added, or correctors were chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum DefaultCorrection {
-    Wanted,
-    Replaced,
-}
-
-/// Whether the step size is compared with the stability limit of the scheme.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stability {
-    Checked,
-    Unchecked,
-}
-
-/// Whether the works of the energy balance are accumulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum EnergyBalance {
-    Off,
-    On,
+/// Settings of the steps.
+struct Settings {
+    start_up: StartUp,
+    newton: Option<Newton>,
+    control: Option<StepControl>,
+    /// Whether the works of the energy balance are accumulated.
+    balances_energy: bool,
+    /// Whether the step size is compared with the stability limit of the scheme.
+    checks_stability: bool,
 }
 
 impl<T: Real> std::fmt::Debug for SimulationBuilder<'_, T> {
@@ -112,43 +104,47 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             system,
             integrator,
             h,
-            t: 0.0,
-            u: None,
-            v: None,
             constraints: Vec::new(),
             contact_solver: Box::new(ActiveSet::default()),
             correctors: Vec::new(),
-            correction: DefaultCorrection::Wanted,
+            corrects_by_default: true,
             linear_solver: Box::new(Automatic),
-            start_up: StartUp::default(),
-            newton: None,
-            control: None,
+            initial: InitialState {
+                t: 0.0,
+                u: None,
+                v: None,
+                overclosure: InitialOverclosure::Refused,
+                balanced: Balanced::Massless,
+            },
             resumed: None,
-            balance: EnergyBalance::Off,
-            stability: Stability::Checked,
-            overclosure: InitialOverclosure::Refused,
-            balanced: Balanced::Massless,
+            settings: Settings {
+                start_up: StartUp::default(),
+                newton: None,
+                control: None,
+                balances_energy: false,
+                checks_stability: true,
+            },
         }
     }
 
     /// Time at the start; 0 by default.
     #[must_use]
     pub fn start_time(mut self, t: f64) -> Self {
-        self.t = t;
+        self.initial.t = t;
         self
     }
 
     /// Initial displacements, one a dof; zero by default. Prescribed dofs may be left at zero.
     #[must_use]
     pub fn displacement(mut self, u: Vec<T>) -> Self {
-        self.u = Some(u);
+        self.initial.u = Some(u);
         self
     }
 
     /// Initial velocities, one a dof; zero by default. Prescribed dofs may be left at zero.
     #[must_use]
     pub fn velocity(mut self, v: Vec<T>) -> Self {
-        self.v = Some(v);
+        self.initial.v = Some(v);
         self
     }
 
@@ -179,7 +175,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     #[must_use]
     pub fn uncorrected(mut self) -> Self {
         self.correctors.clear();
-        self.correction = DefaultCorrection::Replaced;
+        self.corrects_by_default = false;
         self
     }
 
@@ -194,7 +190,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// [`ContactLaw::RateCondition`] and [`ContactLaw::PersistencySwitch`] suppress oscillation by themselves.
     #[must_use]
     pub fn corrector(mut self, corrector: impl Corrector<T> + 'a) -> Self {
-        self.correction = DefaultCorrection::Replaced;
+        self.corrects_by_default = false;
         self.correctors.push(Box::new(corrector));
         self
     }
@@ -203,7 +199,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// [uncorrected](Self::uncorrected).
     #[must_use]
     pub fn correctors(mut self, correctors: impl IntoIterator<Item = Box<dyn Corrector<T> + 'a>>) -> Self {
-        self.correction = DefaultCorrection::Replaced;
+        self.corrects_by_default = false;
         self.correctors.extend(correctors);
         self
     }
@@ -239,14 +235,14 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// ```
     #[must_use]
     pub fn start_up(mut self, start_up: StartUp) -> Self {
-        self.start_up = start_up;
+        self.settings.start_up = start_up;
         self
     }
 
     /// Settings of Newton's method; [`Newton::full`] by default for nonlinear systems. A linear system needs none.
     #[must_use]
     pub fn newton(mut self, newton: Newton) -> Self {
-        self.newton = Some(newton);
+        self.settings.newton = Some(newton);
         self
     }
 
@@ -254,7 +250,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// is returned.
     #[must_use]
     pub fn step_control(mut self, control: StepControl) -> Self {
-        self.control = Some(control);
+        self.settings.control = Some(control);
         self
     }
 
@@ -262,7 +258,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// and a product with C, with supports one evaluation of f, with contacts their gaps and rates once more.
     #[must_use]
     pub fn energy_balance(mut self) -> Self {
-        self.balance = EnergyBalance::On;
+        self.settings.balances_energy = true;
         self
     }
 
@@ -291,7 +287,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// ```
     #[must_use]
     pub fn initial_overclosure(mut self, overclosure: InitialOverclosure) -> Self {
-        self.overclosure = overclosure;
+        self.initial.overclosure = overclosure;
         self
     }
 
@@ -334,7 +330,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// ```
     #[must_use]
     pub fn start_at_rest(mut self) -> Self {
-        self.balanced = Balanced::All;
+        self.initial.balanced = Balanced::All;
         self
     }
 
@@ -355,7 +351,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// circles are used.
     #[must_use]
     pub fn unchecked_stability(mut self) -> Self {
-        self.stability = Stability::Unchecked;
+        self.settings.checks_stability = false;
         self
     }
 
@@ -380,7 +376,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let run = self.over_ranks(&together).and_then(|builder| builder.build_together(&together));
         let mut run = together.finish(run)?;
         // A run that controlled its step size may have ended between two steps of this one.
-        if run.judge.is_none() {
+        if run.monitors.judge.is_none() {
             run.set_step_size(run.history.step_size())?;
         }
         Ok(run)
@@ -396,17 +392,18 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
-        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, balanced, .. } = self;
-        step_size::<T>(h)?;
-        check_times(t, self.overclosure)?;
+        let Self { mut system, integrator, h, constraints, mut contact_solver, settings, .. } = self;
+        let InitialState { t, u, v, overclosure, balanced } = self.initial;
+        check_step_size::<T>(h)?;
+        check_times(t, overclosure)?;
         self.resumed.as_ref().map_or_else(|| Clock::new(t, h), Resumed::clock).check()?;
         let dofs = check_system(&*system)?;
         let tableau = integrator.tableau();
         tableau.check(&integrator.name())?;
-        let by_default = self.correction == DefaultCorrection::Wanted;
-        let admitted = admitted(&*integrator, &tableau, &*contact_solver, (&self.correctors, by_default));
+        let listed = ListedCorrector::list(&self.correctors, &tableau);
+        let support = LawSupport::of(&*integrator, &tableau, &*contact_solver, (&listed, self.corrects_by_default));
         check_lagged_damping(&*integrator, &tableau, &mut *system)?;
-        let scheme = Scheme::new(integrator, tableau, self.start_up);
+        let scheme = Scheme::new(integrator, tableau, settings.start_up);
         let [mut u, mut v] = initial_motion(together, [u, v], dofs)?;
 
         let massless = massless_dofs(&*system, together)?;
@@ -419,41 +416,38 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             put_initial_supports(&mut *system, t, &mut u, &mut v)?;
             ((t, &u[..], &v[..]), &[][..])
         };
-        let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), broken, admitted)?;
+        let (mut constraints, mut g) = Constraints::new(constraints, begin, system.prescribed(), broken, support)?;
         let alike = ["the step size", "the start time", "the number of contact dofs"];
         check_alike(together, alike, [h, begin.0, constraints.interface().len() as f64])?;
         check_interface(together, dofs, constraints.interface())?;
-        if self.stability == Stability::Checked {
+        if settings.checks_stability {
             stability::check_scheme(&scheme)?;
         }
         if constraints.may_press() {
-            check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
+            check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &listed)?;
         }
         let mut projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
-        let is_smooth = self.correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        let is_smooth = listed.iter().any(|corrector| corrector.effects.leaves_smooth_motion);
         let is_resumed = resumed.is_some();
         let begun = if let Some((state, history)) = resumed {
-            take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
+            find_resumed_contacts(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
             Begun { state, history, adjustment: None }
         } else {
             let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
             let start =
                 Start { system, contact_solver, scheme: &scheme, together, h, t, massless, balanced, is_smooth };
-            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Initial(self.overclosure))?
+            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Initial(overclosure))?
         };
         let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;
         contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
-        if self.correction == DefaultCorrection::Wanted {
+        if self.corrects_by_default {
             correctors.extend(default_corrections(&scheme.tableau, &constraints, &massless));
         }
-        let limit = match self.stability {
-            Stability::Unchecked => StepLimit::Unchecked,
-            Stability::Checked => {
-                let at = (&state.motion, history.clock.h);
-                step_limit((&mut *system, together), &scheme, at, is_resumed)?
-            }
+        let limit = match settings.checks_stability {
+            false => StepLimit::Unchecked,
+            true => step_limit((&mut *system, together), &scheme, (&state.motion, history.clock.h), is_resumed)?,
         };
 
         let (interface, unit) = (constraints.interface(), Unit::of(&constraints));
@@ -468,32 +462,30 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
         let follower = follows.then(|| scheme.integrator.name());
         work.keep_massless(massless, (&mut *system, together), (&program, follower), &state.motion, interface)?;
-        work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
-        work.shown = scheme.shown(&state.motion);
-        let checked = self.stability == Stability::Checked && together.is_alone();
-        work.stiffening = checked.then(|| Stiffening::of(&*system, &scheme, constraints.may_press())).flatten();
-        let booked = self.balance == EnergyBalance::On;
+        work.newton = newton(settings.newton, &mut *system, &scheme, &program, &state.motion)?;
+        work.rates = scheme.rates(&state.motion);
+        work.stiffening = (settings.checks_stability && together.is_alone())
+            .then(|| Stiffening::of(&*system, &scheme, constraints.may_press()))
+            .flatten();
         let parts = (together, &*self.linear_solver);
-        let ledger =
-            booked.then(|| Ledger::new(&mut *system, parts, &state, (&constraints, &g))).transpose()?.map(Box::new);
-        let judge = self.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
+        let ledger = settings
+            .balances_energy
+            .then(|| Ledger::new(&mut *system, parts, &state, (&constraints, &g)))
+            .transpose()?
+            .map(Box::new);
+        let judge =
+            settings.control.map(|control| judge(control, &scheme, constraints.may_press(), dofs)).transpose()?;
+        let linear_solver = self.linear_solver;
         Ok(Simulation {
-            system,
+            parts: Parts { system, contact_solver, correctors, linear_solver, together: together.clone() },
             constraints,
             g,
-            contact_solver,
-            correctors,
-            linear_solver: self.linear_solver,
-            together: together.clone(),
             scheme,
-            program,
-            limit,
-            startup,
+            compiled: Compiled { program, startup },
             state,
             history,
             work,
-            ledger,
-            judge,
+            monitors: Monitors { limit, ledger, judge },
             adjustment,
             poisoned: false,
             statistics: Statistics { factorizations: factorizations as u64, ..Statistics::default() },
@@ -512,7 +504,7 @@ fn initial_motion<T: Real>(together: &Together<T>, given: [Option<Vec<T>>; 2], d
 }
 
 /// Finds the rows of the state that a run continues from, and checks that they fit.
-fn take_up<T: Real>(
+fn find_resumed_contacts<T: Real>(
     constraints: &mut Constraints<'_, T>,
     g: &mut ContactJacobian<T>,
     (scheme, prescribed): (&Scheme<'_>, &[usize]),
@@ -558,10 +550,6 @@ fn massless_dofs<T: Real>(system: &dyn System<T>, together: &Together<T>) -> Res
 }
 
 fn check_times(t: f64, overclosure: InitialOverclosure) -> Result<()> {
-    let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
-        true => Ok(()),
-        false => Err(Error::Parameter { name, value, range: "positive and finite" }),
-    };
     if let InitialOverclosure::RemovedOver(time) = overclosure {
         positive("the time over which overclosures are removed", time)?;
     }
@@ -606,7 +594,7 @@ fn check_system<T: Real>(system: &dyn System<T>) -> Result<usize> {
         return Err(Error::MissingDof { what: "a support", dof, dofs });
     }
     match prescribed.windows(2).find(|pair| pair[0] >= pair[1]) {
-        Some(pair) if pair[0] == pair[1] => Err(Error::PrescribedTwice { dof: pair[0] }),
+        Some(pair) if pair[0] == pair[1] => Err(Error::RepeatedDof { what: "the list of supports", dof: pair[0] }),
         Some(_) => Err(Error::Incompatible { part: "the system".into(), reason: "its prescribed dofs must ascend" }),
         None => Ok(dofs),
     }

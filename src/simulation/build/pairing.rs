@@ -6,6 +6,8 @@ use crate::corrector::{Corrector, PersistencyCorrection, Requirements, WorkBalan
 use crate::error::{Error, Result};
 use crate::integrator::TimeIntegrator;
 use crate::real::Real;
+use crate::rounding::COEFFICIENT;
+use crate::simulation::build::law_support::ListedCorrector;
 use crate::simulation::build::scheme::Scheme;
 use crate::simulation::rows::constraints::Constraints;
 use crate::state::Motion;
@@ -17,7 +19,7 @@ use crate::tableau::{ContactLevel, Tableau};
 pub(crate) fn check_massless(scheme: &Scheme<'_>, dof: Option<&usize>) -> Result<bool> {
     let Some(dof) = dof else { return Ok(false) };
     let reason = match analysis::massless_factor(&scheme.tableau) {
-        Some(factor) if factor.abs() < 1.0 - 1e-9 => return Ok(false),
+        Some(factor) if factor.abs() < 1.0 - COEFFICIENT => return Ok(false),
         Some(_) => {
             "its balance holds halfway, where an error in the displacement of a dof without mass alternates forever; \
              choose a scheme that damps high frequencies, or give the dof a mass"
@@ -36,12 +38,8 @@ pub(crate) fn check_corrections<T: Real>(
     integrator: &dyn TimeIntegrator,
     tableau: &Tableau,
     system: &mut dyn System<T>,
-    correctors: &[Box<dyn Corrector<T> + '_>],
+    correctors: &[ListedCorrector],
 ) -> Result<()> {
-    let refuse = |corrector: &dyn Corrector<T>, reason| {
-        let part = format!("the correction {} with {}", corrector.name(), integrator.name());
-        Err(Error::Incompatible { part, reason })
-    };
     let level = tableau.stages.iter().find_map(|stage| match stage.contact {
         ContactLevel::POSITION => None,
         ContactLevel::Position { .. } => {
@@ -53,13 +51,14 @@ pub(crate) fn check_corrections<T: Real>(
     });
     let damped = system.damping_force().is_some();
     for corrector in correctors {
-        let Requirements { scheme, damping, .. } = corrector.requirements(tableau);
+        let Requirements { scheme, damping, .. } = corrector.requirements;
         let scheme = match level {
-            Some(reason) if !corrector.effects().corrects_massless => Err(reason),
+            Some(reason) if !corrector.effects.corrects_massless => Err(reason),
             _ => scheme,
         };
         if let Err(reason) = scheme.and(if damped { damping } else { Ok(()) }) {
-            return refuse(&**corrector, reason);
+            let part = format!("the correction {} with {}", corrector.name, integrator.name());
+            return Err(Error::Incompatible { part, reason });
         }
     }
     Ok(())
@@ -101,7 +100,7 @@ pub(crate) fn check_lagged_damping<T: Real>(
     system: &mut dyn System<T>,
 ) -> Result<()> {
     let lags = tableau.stages.iter().all(|stage| stage.balance.v.z == 0.0);
-    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + 1e-9;
+    let grows = || analysis::spectral_radius(tableau, 0.1, 0.01) > 1.0 + COEFFICIENT;
     if lags && grows() && system.damping_force().is_some() {
         return Err(Error::Incompatible {
             part: integrator.name(),

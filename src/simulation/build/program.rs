@@ -3,6 +3,8 @@
 use crate::error::Result;
 use crate::linear_solver::LinearSolver;
 use crate::real::Real;
+use crate::rounding::{COEFFICIENT, rounding};
+use crate::simulation::build::scheme::Scheme;
 use crate::simulation::operator::Operator;
 use crate::simulation::operator::responses::Unit;
 use crate::simulation::operator::tangent::At;
@@ -57,7 +59,7 @@ impl<T: Real> ScaledRow<T> {
         // The displacement coefficients sum to 1 (u) or 0 (v, a) in every consistent scheme, up to their own rounding.
         let sum: f64 = row.u.iter().sum();
         let size: f64 = row.u.iter().map(|c| c.abs()).sum();
-        let nearest = if (sum - sum.round()).abs() <= 8.0 * f64::EPSILON * size { sum.round() } else { sum };
+        let nearest = if (sum - sum.round()).abs() <= rounding(size) { sum.round() } else { sum };
         let coefficient = |state: usize, field: usize| match (state, field) {
             (0, 0) => nearest,
             _ => row.past(state)[field],
@@ -94,7 +96,7 @@ impl<T: Real> ScaledRow<T> {
         Some(self.terms.iter().map(term).sum())
     }
 
-    /// Writes the part that comes from the past at some dofs; without a term nothing is written.
+    /// Writes the part that comes from the past at some dofs; without a term the output is left as it is.
     pub(crate) fn predict_at(&self, past: &[Motion<T>], dofs: &[usize], out: &mut [T]) {
         let Some(newest) = past.first().filter(|_| !self.terms.is_empty()) else { return };
         let (plain, differences) = self.terms.split_at(self.plain);
@@ -265,7 +267,7 @@ pub(crate) struct Program<T> {
 impl<T: Real> Program<T> {
     /// Recompiles the same stages for another step size. After an error the program is unchanged. Matrices that vary
     /// are left to the iterations of the step.
-    pub(crate) fn set_step_size(
+    fn set_step_size(
         &mut self,
         stages: &[Stage],
         system: &mut dyn System<T>,
@@ -296,6 +298,34 @@ impl<T: Real> Program<T> {
     }
 }
 
+/// The scheme of a run, compiled for its system and its present step size.
+pub(crate) struct Compiled<T: Real> {
+    pub(crate) program: Program<T>,
+    /// The one-step scheme of the first steps; none once the past is known.
+    pub(crate) startup: Option<Program<T>>,
+}
+
+impl<T: Real> Compiled<T> {
+    /// Recompiles for the step size h instead of `old`. After an error the programs are as before.
+    pub(crate) fn set_step_size(
+        &mut self,
+        scheme: &Scheme<'_>,
+        system: &mut dyn System<T>,
+        [old, h]: [f64; 2],
+        at: At<'_, T>,
+    ) -> Result<()> {
+        let (stages, starter) = (&scheme.tableau.stages, &scheme.derived.starter.stages);
+        self.program.set_step_size(stages, system, old, h, at)?;
+        if let Some(startup) = &mut self.startup
+            && let Err(error) = startup.set_step_size(starter, system, old, h, at)
+        {
+            self.program.set_step_size(stages, system, h, old, at)?;
+            return Err(error);
+        }
+        Ok(())
+    }
+}
+
 /// The data for which a program is compiled.
 pub(crate) struct Compiler<'c, T: Real> {
     pub(crate) system: &'c mut dyn System<T>,
@@ -313,8 +343,8 @@ impl<T: Real> Compiler<'_, T> {
     /// Compiles the scheme of a run.
     pub(crate) fn compile(&mut self, tableau: &Tableau) -> Result<Program<T>> {
         let momentum = tableau.momentum();
-        let books = |s: usize| Ok((momentum.after_stage(s)?.to_vec(), tableau.read_after(s)?));
-        self.stages(tableau, books)
+        let momentum_after = |s: usize| Ok((momentum.after_stage(s)?.to_vec(), tableau.read_after(s)?));
+        self.stages(tableau, momentum_after)
     }
 
     /// Compiles the one-step scheme `start` whose first steps compute the past of the multistep scheme `reader`. Its
@@ -326,11 +356,11 @@ impl<T: Real> Compiler<'_, T> {
     fn stages(
         &mut self,
         tableau: &Tableau,
-        books: impl Fn(usize) -> Result<(Vec<[f64; 3]>, Vec<[bool; 3]>)>,
+        momentum_after: impl Fn(usize) -> Result<(Vec<[f64; 3]>, Vec<[bool; 3]>)>,
     ) -> Result<Program<T>> {
         let mut program = Program { stages: Vec::new(), operators: Vec::new() };
         let stages = &tableau.stages;
-        let reads_no_a = |stage: &Stage| stage.recovery.v.a.iter().all(|a| a.abs() < 1e-12);
+        let reads_no_a = |stage: &Stage| stage.recovery.v.a.iter().all(|a| a.abs() < COEFFICIENT);
         let by_velocities = tableau.depth() == 1 && stages.iter().all(reads_no_a);
         for (s, stage) in stages.iter().enumerate() {
             let weights = stage.balance.each().map(|row| row.z);
@@ -346,7 +376,7 @@ impl<T: Real> Compiler<'_, T> {
                 )?);
             }
             let increment = stage.increment();
-            let (covector, read) = books(s)?;
+            let (covector, read) = momentum_after(s)?;
             let own = tableau.reads_after(s);
             let reads_a = |read: &[[bool; 3]]| read.iter().any(|[.., a]| *a);
             // The first steps of a multistep scheme that reads a are corrected as its own steps are.

@@ -60,36 +60,36 @@ impl<'a> Scheme<'a> {
     }
 
     /// Memory for v and a at the time of a state: empty if they are stored at that time.
-    pub(crate) fn shown<T: Real>(&self, motion: &Motion<T>) -> [Vec<T>; 2] {
+    pub(crate) fn rates<T: Real>(&self, motion: &Motion<T>) -> [Vec<T>; 2] {
         let of = |field: usize| if self.shifts[field - 1] == 0.0 { Vec::new() } else { motion.field(field).to_vec() };
         [of(1), of(2)]
     }
 
     /// Extrapolates stored v and a to the time of the state; without a `past` state they are copied. Prescribed
     /// motions are given at the time of the state. Returns whether all extrapolated values are finite.
-    pub(crate) fn show<T: Real>(
+    pub(crate) fn extrapolate_rates<T: Real>(
         &self,
         new: &Motion<T>,
         past: Option<&Motion<T>>,
         prescribed: &[usize],
-        shown: &mut [Vec<T>; 2],
+        rates: &mut [Vec<T>; 2],
     ) -> bool {
         let mut finite = true;
-        for (field, (shift, shown)) in (1..).zip(self.shifts.into_iter().zip(shown)) {
+        for (field, (shift, rate)) in (1..).zip(self.shifts.into_iter().zip(rates)) {
             if shift != 0.0 {
                 let now = new.field(field);
                 match past {
-                    None => shown.copy_from_slice(now),
+                    None => rate.copy_from_slice(now),
                     Some(past) => {
                         let blocks = now.chunks(BLOCK).zip(past.field(field).chunks(BLOCK));
-                        for ((now, past), shown) in blocks.zip(shown.chunks_mut(BLOCK)) {
-                            T::combine(&[(T::one(), now)], &[(T::of(shift), past)], now, shown);
-                            finite &= T::all_finite(shown);
+                        for ((now, past), rate) in blocks.zip(rate.chunks_mut(BLOCK)) {
+                            T::combine(&[(T::one(), now)], &[(T::of(shift), past)], now, rate);
+                            finite &= T::all_finite(rate);
                         }
                     }
                 }
                 for &dof in prescribed {
-                    shown[dof] = new.field(field)[dof];
+                    rate[dof] = new.field(field)[dof];
                 }
             }
         }

@@ -41,7 +41,7 @@ pub(crate) struct Workspace<T: Real> {
     /// Number of contacts to reserve memory for.
     pub(crate) rows: usize,
     /// v and a at the time of the new state, if the scheme stores them at another time.
-    pub(crate) shown: [Vec<T>; 2],
+    pub(crate) rates: [Vec<T>; 2],
     pub(crate) backup: Backup<T>,
 }
 
@@ -132,7 +132,7 @@ impl<T: Real> Workspace<T> {
             rate_check: RateCheck::new(rows),
             stiffening: None,
             rows,
-            shown: [Vec::new(), Vec::new()],
+            rates: [Vec::new(), Vec::new()],
             backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
         }
     }

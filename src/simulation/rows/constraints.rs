@@ -7,7 +7,7 @@ use crate::contact::{
 use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::build::admitted::Admitted;
+use crate::simulation::build::law_support::LawSupport;
 use crate::simulation::rows::gap_offsets::GapOffsets;
 use crate::simulation::rows::laws::Laws;
 use crate::simulation::rows::part::{Local, Part, gather, of};
@@ -23,7 +23,7 @@ pub(crate) struct Constraints<'a, T: Real> {
     pub(crate) magnitudes: Vec<T>,
     pub(crate) offsets: GapOffsets<T>,
     interface: Interface,
-    admitted: Admitted,
+    law_support: LawSupport,
     pub(crate) reading: Reading,
     /// Number of rows to reserve memory for.
     room: usize,
@@ -81,7 +81,7 @@ impl<'a, T: Real> Constraints<'a, T> {
         (t, u, v): (f64, &[T], &[T]),
         prescribed: &[usize],
         broken: &[BrokenBond],
-        admitted: Admitted,
+        law_support: LawSupport,
     ) -> Result<(Self, ContactJacobian<T>)> {
         let dofs = u.len();
         if let Some(bond) = broken.iter().find(|bond| bond.constraint >= parts.len()) {
@@ -145,7 +145,7 @@ impl<'a, T: Real> Constraints<'a, T> {
             magnitudes: Vec::with_capacity(room),
             offsets: GapOffsets::with_capacity(room),
             interface: Interface { dofs: interface, places },
-            admitted,
+            law_support,
             reading: Reading { stale: true, version: 0, names: Names::default(), old_tangents: Tangents::default() },
             room,
             ahead: 0.0,
@@ -300,7 +300,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads names, laws and G of all rows, and refuses rows that do not fit the system.
     fn read_rows(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, laws, magnitudes, offsets, interface, admitted, reading, .. } = self;
+        let Self { parts, ids, laws, magnitudes, offsets, interface, law_support, reading, .. } = self;
         let (places, names) = (&interface.places, &mut reading.names);
         jacobian.clear();
         laws.clear();
@@ -325,7 +325,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                 }
                 let law = contacts.law(row);
                 law.check::<T>()?;
-                admitted.check(law)?;
+                law_support.check(law)?;
                 laws.push(law);
                 let magnitude = contacts.magnitude(row);
                 if !magnitude.is_finite() {
@@ -358,7 +358,7 @@ impl<'a, T: Real> Constraints<'a, T> {
 
     /// Reads the tangential rows of contacts with friction, which follow the rows of all gaps.
     fn read_tangents(&mut self, jacobian: &mut ContactJacobian<T>) -> Result<()> {
-        let Self { parts, ids, laws, tangents, interface, admitted, reading, .. } = self;
+        let Self { parts, ids, laws, tangents, interface, law_support, reading, .. } = self;
         let (places, old_tangents) = (&interface.places, &mut reading.old_tangents);
         std::mem::swap(tangents, old_tangents);
         tangents.clear();
@@ -374,7 +374,7 @@ impl<'a, T: Real> Constraints<'a, T> {
                         continue;
                     }
                     let rows = contacts.tangents_of(own);
-                    admitted.check_friction(ids[row], (friction, laws[row], rows.len()))?;
+                    law_support.check_friction(ids[row], (friction, laws[row], rows.len()))?;
                     for tangent in rows.clone() {
                         let entries = contacts.tangent_rows().row(tangent);
                         check_entries(entries, (dofs, places), ids[row], "a weight of a tangent (by dof)")?;

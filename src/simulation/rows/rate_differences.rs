@@ -3,9 +3,8 @@
 use crate::contact::{GapRates, Variation};
 use crate::error::Result;
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{rounding, time_resolution};
 use crate::simulation::rows::part::Part;
-use crate::state::resolution;
 
 /// Memory for differences of gaps.
 pub(crate) struct RateDifferences<T> {
@@ -72,7 +71,7 @@ impl<T: Real> RateDifferences<T> {
             constraint.gaps(t + s, moved, gaps)
         };
         // Increments that are representable at t.
-        let [single, double] = shares::<T>().map(|share| (t + (share * ahead).max(resolution(t))) - t);
+        let [single, double] = shares::<T>().map(|share| (t + (share * ahead).max(time_resolution(t))) - t);
         gaps(-single, T::zero(), before)?;
         gaps(single, T::zero(), after)?;
         let size = |row: usize| -> T {

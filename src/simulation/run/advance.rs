@@ -4,9 +4,9 @@ use crate::error::{Error, Result};
 use crate::observer::{Control, Observer, StepView, Wants};
 use crate::ranks::check_alike;
 use crate::real::Real;
+use crate::rounding::{TIME_SHARE, time_resolution};
 use crate::simulation::run::Simulation;
 use crate::simulation::run::results::Outcome;
-use crate::state::resolution;
 
 impl<T: Real> Simulation<'_, T> {
     /// Takes one step. Under [`step_control`](crate::SimulationBuilder::step_control) smaller sizes are tried until
@@ -20,7 +20,7 @@ impl<T: Real> Simulation<'_, T> {
     /// [`Error::StepRefused`] if smaller steps were tried. State and history are then unchanged. [`Error::Poisoned`]
     /// after a panic of the host that was caught.
     pub fn step(&mut self) -> Result<()> {
-        self.guarded(|run| match run.judge {
+        self.guarded(|run| match run.monitors.judge {
             Some(_) => run.controlled_step(),
             None => run.attempt().map(drop),
         })
@@ -38,7 +38,7 @@ impl<T: Real> Simulation<'_, T> {
         if !t.is_finite() {
             return Err(Error::Parameter { name: "the end time", value: t, range: "finite" });
         }
-        check_alike(&self.together, ["the end time"], [t])?;
+        check_alike(&self.parts.together, ["the end time"], [t])?;
         while !self.history.clock.has_reached(t) {
             if self.observed_step(observer)? == Control::Stop {
                 return Ok(Outcome::Stopped);
@@ -51,17 +51,17 @@ impl<T: Real> Simulation<'_, T> {
     fn observed_step(&mut self, observer: &mut dyn Observer<T>) -> Result<Control> {
         self.step()?;
         // Energies are sums over all ranks, which take part even if only an observer elsewhere needs them.
-        let [wanted] = self.together.sum(Ok([f64::from(u8::from(observer.wants() == Wants::Energy))]))?;
+        let [wanted] = self.parts.together.sum(Ok([f64::from(u8::from(observer.wants() == Wants::Energy))]))?;
         let energy = (wanted > 0.0).then(|| self.energy());
         energy.map_or(Ok(()), |energy| energy.check(self.time()))?;
         let view = StepView { state: &self.state, energy, h: self.history.made_with, statistics: &self.statistics };
         let observed = observer.observe(&view);
-        if self.together.is_alone() {
+        if self.parts.together.is_alone() {
             return observed;
         }
         let stops = observed.map(|control| [f64::from(u8::from(control == Control::Stop))]);
-        let stops = self.together.sum(stops);
-        self.together.caught();
+        let stops = self.parts.together.sum(stops);
+        self.parts.together.caught();
         Ok(if stops? == [0.0] { Control::Continue } else { Control::Stop })
     }
 
@@ -91,14 +91,14 @@ impl<T: Real> Simulation<'_, T> {
             return self.run_until(t, observer);
         }
         // Times closer than this count as the same.
-        let sliver = (1e-9 * nominal).max(resolution(t));
-        while self.history.clock.h <= self.history.clock.until(t) + sliver.min(0.5 * self.history.clock.h) {
+        let tolerance = (TIME_SHARE * nominal).max(time_resolution(t));
+        while self.history.clock.h <= self.history.clock.until(t) + tolerance.min(0.5 * self.history.clock.h) {
             if self.observed_step(observer)? == Control::Stop {
                 return Ok(Outcome::Stopped);
             }
         }
         let rest = self.history.clock.until(t);
-        if rest <= sliver {
+        if rest <= tolerance {
             return Ok(Outcome::Reached);
         }
         self.set_step_size(rest)?;

@@ -72,11 +72,11 @@ impl<T: Real> Simulation<'_, T> {
     pub fn contact_forces(&self) -> impl Iterator<Item = ContactForce<T>> + '_ {
         let contacts = &self.state.contacts;
         // Read from the constraints now: positions move without their rows.
-        let said: Vec<Contacts<T>> = (0..).map_while(|part| self.constraint(part)).map(Contacts::of).collect();
+        let reported: Vec<Contacts<T>> = (0..).map_while(|part| self.constraint(part)).map(Contacts::of).collect();
         self.constraints.rows_of(contacts).map(move |(contact, row)| {
             let id = contacts.ids[contact];
             let (first, dofs) = self.constraints.rows_of_part(id.constraint);
-            let (own, said) = (row - first, &said[id.constraint]);
+            let (own, reported) = (row - first, &reported[id.constraint]);
             let on_system = |row: Vec<(usize, T)>| row.into_iter().map(|(place, w)| (dofs[place], w)).collect();
             ContactForce {
                 id,
@@ -87,11 +87,11 @@ impl<T: Real> Simulation<'_, T> {
                 slip: contacts.slip(contact).to_vec(),
                 row: self.g.row(row).collect(),
                 tangents: match self.constraints.tangents().of(row) {
-                    rows if rows.is_empty() => said.tangents(own).into_iter().map(on_system).collect(),
+                    rows if rows.is_empty() => reported.tangents(own).into_iter().map(on_system).collect(),
                     rows => rows.map(|row| self.g.row(row).collect()).collect(),
                 },
-                position: said.position(own),
-                normal: said.normal(own),
+                position: reported.position(own),
+                normal: reported.normal(own),
             }
         })
     }

@@ -2,7 +2,6 @@
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
-use crate::simulation::run::Simulation;
 use crate::state::ContactState;
 
 /// Impulses on the dofs (force × time), one entry a dof; empty without constraints.
@@ -54,36 +53,13 @@ impl<T: Real> Impulses<T> {
         }
     }
 
+    /// Of the last accepted step.
+    pub(crate) fn last(&self) -> &[T] {
+        &self.last
+    }
+
     pub(crate) fn accept(&mut self) {
         std::mem::swap(&mut self.trial, &mut self.last);
         std::mem::swap(&mut self.trial_pushes, &mut self.last_pushes);
-    }
-}
-
-impl<T: Real> Simulation<'_, T> {
-    /// The impulses of all contacts on each dof (force × time), friction and corrections included, in the last step
-    /// that this simulation has made; empty without constraints.
-    ///
-    /// Their sum over the dofs of a body along a direction is the impulse of contact on that body: under no other
-    /// force along that direction it is the change of the body's [`momentum`](Self::momentum), to rounding. Over two
-    /// bodies that touch only each other the sum is zero.
-    ///
-    /// ```
-    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Composite, LinearRows, LinearSystem, Simulation};
-    ///
-    /// // Two free masses, of which the first runs into the second with speed 2.
-    /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
-    /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
-    /// let system = LinearSystem::lumped(vec![1.0; 2], free)?;
-    /// let gap = LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.05);
-    /// let mut run = Simulation::builder(system, Composite, 0.1).velocity(vec![2.0, 0.0]).constraint(gap).build()?;
-    /// run.step()?;
-    /// let [first, second] = run.impulses_on_dofs() else { panic!("two dofs") };
-    /// assert!((first + 1.0).abs() < 1e-12 && (second - 1.0).abs() < 1e-12);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn impulses_on_dofs(&self) -> &[T] {
-        &self.work.contact.impulses.last
     }
 }

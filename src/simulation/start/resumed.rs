@@ -1,14 +1,14 @@
 //! State and history that a run continues from, refused if they do not fit the run.
 
-use crate::error::{Error, Result, step_size};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::build::scheme::Scheme;
 #[cfg(feature = "serde")]
-use crate::simulation::step::resample::trail_length;
+use crate::simulation::step::resample::computed_capacity;
 #[cfg(feature = "serde")]
 use crate::state::{Checkpoint, Motion};
 use crate::state::{Clock, History, Names, State};
-use crate::system::check_vector;
+use crate::system::{check_step_size, check_vector};
 
 /// State and history that a run continues from.
 pub(crate) struct Resumed<T> {
@@ -68,7 +68,7 @@ impl<T: Real> Resumed<T> {
         if own.to_bits() != h.to_bits() {
             return Err(Error::Parameter { name: "the step size of the history", value: own, range: "h of the run" });
         }
-        step_size::<T>(history.clock.h)?;
+        check_step_size::<T>(history.clock.h)?;
         Ok((state, history))
     }
 }
@@ -91,12 +91,12 @@ fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_
         return refuse("the rows of its scheme were others, though their name was that of the scheme of this run");
     }
     let slots = scheme.slots();
-    let trail = history.trail.room();
+    let computed = history.computed.room();
     let shifted = scheme.shifts.map(|shift| shift != 0.0);
     // Values at the time of the state are there if, and only if, the stored values belong to another time.
-    let shown = state.shown.each_ref().map(|shown| !shown.is_empty());
-    let moved = history.unmoved.iter().zip(shifted).any(|(unmoved, shifted)| !unmoved.is_empty() && !shifted);
-    let length = trail == 0 || trail == trail_length(scheme);
+    let shown = state.rates.each_ref().map(|rate| !rate.is_empty());
+    let moved = history.unshifted.iter().zip(shifted).any(|(unshifted, shifted)| !unshifted.is_empty() && !shifted);
+    let length = computed == 0 || computed == computed_capacity(scheme);
     if history.known > scheme.depth || history.slots.len() > slots || !length || moved || shown != shifted {
         return refuse("it does not hold what this scheme reads");
     }

@@ -3,6 +3,7 @@
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::TIME_SHARE;
 use crate::simulation::operator::tangent::At;
 use crate::simulation::run::Simulation;
 use crate::simulation::step::judge::Verdict;
@@ -16,8 +17,8 @@ impl<T: Real> Simulation<'_, T> {
         let result = loop {
             let h = self.history.clock.h;
             let smaller = 0.5 * h;
-            let Some(judge) = &mut self.judge else { break self.attempt().map(drop) };
-            let last = smaller < judge.control.smallest * (1.0 - 1e-9);
+            let Some(judge) = &mut self.monitors.judge else { break self.attempt().map(drop) };
+            let last = smaller < judge.control.smallest * (1.0 - TIME_SHARE);
             judge.suspended = last;
             judge.begin(&self.state, self.history.pace.lasting);
             match self.attempt() {
@@ -32,7 +33,7 @@ impl<T: Real> Simulation<'_, T> {
                     let refusal = match verdict {
                         Err(Error::Stiffened { contact: Some(_), .. }) => Refusal::StiffContact,
                         Err(Error::Stiffened { contact: None, .. }) => Refusal::StiffSystem,
-                        _ => Refusal::Passing,
+                        _ => Refusal::Temporary,
                     };
                     self.statistics.refused_steps += 1;
                     refusals += 1;
@@ -54,10 +55,12 @@ impl<T: Real> Simulation<'_, T> {
                 let (h, tried) = (history.clock.h, self.history.clock.h);
                 (self.state, self.history) = (state, history);
                 if self.history.known == self.scheme.depth {
-                    self.startup = None;
+                    self.compiled.startup = None;
                 }
-                let compiled = self.compile_for(tried, h);
-                self.together.finish(compiled)?;
+                let Self { parts, compiled, scheme, state, .. } = self;
+                let at = At::state(&state.motion);
+                let compiled = compiled.set_step_size(scheme, &mut *parts.system, [tried, h], at);
+                self.parts.together.finish(compiled)?;
                 Err(error)
             }
         }
@@ -65,7 +68,8 @@ impl<T: Real> Simulation<'_, T> {
 
     /// Counts a good step, and doubles the step size if the nominal grid and the judgment allow it.
     fn grow(&mut self) {
-        let Self { judge: Some(judge), constraints, state, statistics, history, .. } = self else { return };
+        let Self { monitors, constraints, state, statistics, history, .. } = self;
+        let Some(judge) = &mut monitors.judge else { return };
         statistics.coarse_steps += u64::from(judge.coarse);
         history.pace.note_change(judge.changed, history.clock.h);
         let may_grow = judge.may_grow() && !judge.coarse;
@@ -82,20 +86,9 @@ impl<T: Real> Simulation<'_, T> {
         }
     }
 
-    /// Compiles the programs for h again; they are compiled for `other`.
-    fn compile_for(&mut self, other: f64, h: f64) -> Result<()> {
-        let Self { system, scheme, program, startup, state, .. } = self;
-        let at = At::state(&state.motion);
-        program.set_step_size(&scheme.tableau.stages, &mut **system, other, h, at)?;
-        match startup {
-            Some(startup) => startup.set_step_size(&scheme.derived.starter.stages, &mut **system, other, h, at),
-            None => Ok(()),
-        }
-    }
-
     /// The estimate of the local error of the last step (length), for runs that
     /// [control it](crate::StepControl::local_error).
     pub fn local_error(&self) -> Option<f64> {
-        self.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
+        self.monitors.judge.as_ref().filter(|judge| judge.local.is_some()).map(|judge| judge.estimate)
     }
 }

@@ -42,7 +42,7 @@ use crate::state::{Motion, State};
 ///     smallest = smallest.min(step.h);
 ///     contact_dynamics::Control::Continue
 /// })?;
-/// // The impact is met by steps in which the mass travels no more than the tolerance; the others are large again.
+/// // The impact is met by steps in which the mass travels at most the tolerance; the others are large again.
 /// assert!(smallest <= 1e-3 && run.step_size() == 0.1);
 /// assert!(run.statistics().steps < 60 && run.statistics().refused_steps >= 7);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

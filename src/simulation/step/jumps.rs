@@ -10,7 +10,7 @@ use crate::simulation::stage::contact::ContactWork;
 use crate::state::{ContactState, Motion};
 
 /// Lists which contacts exert a force at displacements u, and replaces the old list.
-pub(crate) fn note_exerting<T: Real>(
+pub(crate) fn store_exerting<T: Real>(
     (constraints, g): (&Constraints<'_, T>, &ContactJacobian<T>),
     contacts: &ContactState<T>,
     u: &[T],

@@ -1,23 +1,22 @@
-//! Changes of the step size and restarts: the past of a multistep scheme resampled or forgotten.
+//! Changes of the step size: the past of a multistep scheme is resampled, or computed again.
 
 use crate::contact::{ContactJacobian, GapRates};
-use crate::contact_solver::FORESEEN;
-use crate::corrector::{Corrector, Gaps, JumpProjection, no_response};
-use crate::error::{Result, step_size};
+use crate::corrector::{Gaps, JumpProjection, no_response};
+use crate::error::Result;
 use crate::ranks::check_alike;
 use crate::real::Real;
+use crate::rounding::{COEFFICIENT, TIME_SHARE};
 use crate::simulation::build::program::{Compiler, Program};
 use crate::simulation::build::scheme::Scheme;
 use crate::simulation::operator::responses::Unit;
 use crate::simulation::operator::tangent::At;
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::run::Simulation;
-use crate::simulation::start::massless::Balanced;
+use crate::simulation::run::{Parts, Simulation};
+use crate::simulation::start;
 use crate::simulation::start::past::taylor;
-use crate::simulation::start::{self, Begun, Start, Violation};
 use crate::simulation::watch::stability::{self, StepLimit};
-use crate::state::{History, Motion, Pace, State, Trail};
-use crate::system::Linearity;
+use crate::state::{ComputedMotions, History, Motion, Pace, State};
+use crate::system::{Linearity, check_step_size};
 
 /// The past is extrapolated to at most this multiple of its age: polynomials grow beyond it. It is not extrapolated
 /// at all if a scheme reads its accelerations: in stiff motions they grow with the frequency.
@@ -73,7 +72,7 @@ impl<T: Real> Simulation<'_, T> {
     /// as it was.
     pub fn set_step_size(&mut self, h: f64) -> Result<()> {
         self.guarded(|run| {
-            check_alike(&run.together, ["the step size"], [h])?;
+            check_alike(&run.parts.together, ["the step size"], [h])?;
             run.change_step_size(h)?;
             run.history.pace = Pace::new(h);
             Ok(())
@@ -83,7 +82,7 @@ impl<T: Real> Simulation<'_, T> {
     /// Changes the step size, and not the nominal one.
     pub(crate) fn change_step_size(&mut self, h: f64) -> Result<()> {
         let result = self.change_step_size_together(h);
-        self.together.finish(result)
+        self.parts.together.finish(result)
     }
 
     fn change_step_size_together(&mut self, h: f64) -> Result<()> {
@@ -91,43 +90,41 @@ impl<T: Real> Simulation<'_, T> {
         if h.to_bits() == old.to_bits() {
             return Ok(());
         }
-        step_size::<T>(h)?;
+        check_step_size::<T>(h)?;
         let clock = self.history.clock.with_step_size(h);
         clock.check()?;
         // Steps of a system that may stiffen are checked as they are taken: they grow back to the nominal size,
         // whatever the check has found where the run was built or resumed.
-        let grows_back = self.system.linearity() == Linearity::Nonlinear && h <= self.history.pace.nominal;
-        if let StepLimit::Cleared(cleared) = self.limit
+        let grows_back = self.parts.system.linearity() == Linearity::Nonlinear && h <= self.history.pace.nominal;
+        if let StepLimit::Cleared(cleared) = self.monitors.limit
             && h > cleared
             && !grows_back
         {
-            self.limit =
-                stability::check_step((&mut *self.system, &self.together), &self.scheme, &self.state.motion, h)?;
+            self.monitors.limit = stability::check_step(
+                (&mut *self.parts.system, &self.parts.together),
+                &self.scheme,
+                &self.state.motion,
+                h,
+            )?;
         }
         let anew = self.is_beyond_past(h);
         let (past, velocity, starter) = match anew {
             true => {
-                let starter = self.startup.is_none().then(|| self.compiled_starter(h)).transpose()?;
+                let motion = self.state.motion.clone();
+                let starter = self.compiled.startup.is_none().then(|| self.compiled_starter(h, &motion)).transpose()?;
                 (Vec::new(), Some(self.velocity_of_momentum()?), starter)
             }
             false => (self.resampled(h)?, None, None),
         };
-        let Self { system, scheme, program, startup, state, history, statistics, .. } = self;
-        let at = At::state(&state.motion);
-        program.set_step_size(&scheme.tableau.stages, &mut **system, old, h, at)?;
-        if let Some(startup) = startup
-            && let Err(error) = startup.set_step_size(&scheme.derived.starter.stages, &mut **system, old, h, at)
-        {
-            program.set_step_size(&scheme.tableau.stages, &mut **system, h, old, at)?;
-            return Err(error);
-        }
+        let Self { parts, compiled, scheme, state, history, statistics, .. } = self;
+        compiled.set_step_size(scheme, &mut *parts.system, [old, h], At::state(&state.motion))?;
         if starter.is_some() {
-            *startup = starter;
+            compiled.startup = starter;
         }
-        let programs = std::iter::once(&*program).chain(&*startup);
+        let programs = std::iter::once(&compiled.program).chain(&compiled.startup);
         let constant = programs.flat_map(|program| &program.operators).filter(|operator| !operator.varies());
         statistics.factorizations += constant.count() as u64;
-        keep_trail(scheme, state, history);
+        keep_computed(scheme, state, history);
         move_shifted(scheme, state, history, h);
         for (slot, resampled) in history.slots[1..].iter_mut().zip(past) {
             *slot = resampled;
@@ -148,16 +145,16 @@ impl<T: Real> Simulation<'_, T> {
         let reads = scheme.tableau.reads_after(scheme.tableau.stages.len() - 1);
         let farthest = if reads.iter().skip(1).any(|reads| reads[2]) { 1.0 } else { FARTHEST };
         let needed = (history.known - 1) as f64 * h;
-        let computed = computed(state, history).last().map_or(0.0, |oldest| oldest.age);
+        let computed = smooth_motions(state, history).last().map_or(0.0, |oldest| oldest.age);
         // After an impact only the newest state is known: then the size of the step that made it counts.
-        needed > farthest * (1.0 + 1e-9) * computed.max((history.known - 1) as f64 * history.made_with)
+        needed > farthest * (1.0 + TIME_SHARE) * computed.max((history.known - 1) as f64 * history.made_with)
     }
 
     /// The velocity with which the newest state alone, without its past, has the momentum of the scheme. The stored
     /// velocity has an error O(h²), which matters only if the scheme continues from it alone. Closed contacts keep
     /// their gap rates.
-    fn velocity_of_momentum(&mut self) -> Result<Vec<T>> {
-        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
+    fn velocity_of_momentum(&self) -> Result<Vec<T>> {
+        let Self { parts: Parts { system, .. }, g, state, history, scheme, work, .. } = self;
         let h = history.clock.h;
         let newest = &state.motion;
         let psi = scheme.derived.covectors.get(history.known - 1).filter(|psi| !reads_accelerations_alone(psi));
@@ -167,35 +164,46 @@ impl<T: Real> Simulation<'_, T> {
         for &dof in system.prescribed().iter().chain(&work.massless) {
             velocity[dof] = newest.v[dof];
         }
-        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        let tangents = constraints.tangents();
-        let corrected =
-            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
-        let rigid: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
-        if !rigid.is_empty() {
-            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
-            projection.close_rows(g, &rigid, |row| no_response(newest.t, constraints.ids[row]))?;
-            let targets: Vec<T> = rigid.iter().map(|&row| g.product(row, &newest.v)).collect();
-            projection.remove_jump(g, &targets, &mut velocity, &mut vec![T::zero(); rigid.len()])?;
+        if let Some((mut projection, closed)) = self.projection_on_closed()? {
+            let targets: Vec<T> = closed.iter().map(|&row| g.product(row, &newest.v)).collect();
+            projection.remove_jump(g, &targets, &mut velocity, &mut vec![T::zero(); closed.len()])?;
         }
         Ok(velocity)
     }
 
-    /// The scheme of the first steps, for another step size.
-    fn compiled_starter(&mut self, h: f64) -> Result<Program<T>> {
-        let Self { system, constraints, linear_solver, scheme, state, .. } = self;
+    /// The closed rows along which past states are projected, and the projection, if there are any.
+    fn projection_on_closed(&self) -> Result<Option<(JumpProjection<T>, Vec<usize>)>> {
+        let Self { parts: Parts { system, together, linear_solver, .. }, constraints, g, state, work, .. } = self;
+        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
+        // Rows whose law reads the gap at the start of a stage may hold it anywhere. Rows on dofs without mass have
+        // nothing to correct, and would move the other side only.
+        let tangents = constraints.tangents();
+        let corrected =
+            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
+        let closed: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
+        if closed.is_empty() {
+            return Ok(None);
+        }
+        let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
+        projection.close_rows(g, &closed, |row| no_response(state.motion.t, constraints.ids[row]))?;
+        Ok(Some((projection, closed)))
+    }
+
+    /// The scheme of the first steps, for a step size and tangents at a motion.
+    pub(super) fn compiled_starter(&mut self, h: f64, motion: &Motion<T>) -> Result<Program<T>> {
+        let Self { parts: Parts { system, linear_solver, .. }, constraints, scheme, .. } = self;
         let (interface, unit) = (constraints.interface(), Unit::of(constraints));
-        let at = At::state(&state.motion);
+        let at = At::state(motion);
         let mut compiler = Compiler { system: &mut **system, solver: &**linear_solver, h, at, interface, unit };
         compiler.start(&scheme.derived.starter, &scheme.tableau)
     }
 
     /// Past states 1, 2, … known − 1 at the spacing h.
     fn resampled(&mut self, h: f64) -> Result<Vec<Motion<T>>> {
-        let Self { system, constraints, g, state, history, scheme, work, together, linear_solver, .. } = self;
+        let Self { state, history, scheme, .. } = &*self;
         let known = history.known;
         let newest = &state.motion;
-        let nodes = computed(state, history);
+        let nodes = smooth_motions(state, history);
         let mut past = vec![Motion::zero(newest.u.len()); known - 1];
         for (k, out) in (1..known).zip(&mut past) {
             let age = k as f64 * h;
@@ -208,95 +216,14 @@ impl<T: Real> Simulation<'_, T> {
             out.t = newest.t - age;
         }
         conserve_momentum(scheme, state, history, h, &mut past);
-        let closed = constraints.rows_of(&state.contacts).filter(|&(contact, _)| state.contacts.closed[contact]);
-        // Rows whose law reads the gap at the start of a stage may hold it anywhere. Rows on dofs without mass have
-        // nothing to correct, and would move the other side only.
-        let tangents = constraints.tangents();
-        let corrected =
-            |&row: &usize| !constraints.law(row).may_penetrate() && !tangents.act_on(g, row, &work.massless);
-        let closed: Vec<usize> = closed.map(|(_, row)| row).filter(corrected).collect();
-        if history.smooth < known && !closed.is_empty() {
-            let mut projection = start::projection(&**system, constraints, (together, &**linear_solver))?;
-            projection.close_rows(g, &closed, |row| no_response(newest.t, constraints.ids[row]))?;
+        if history.smooth < known
+            && let Some((mut projection, closed)) = self.projection_on_closed()?
+        {
             for motion in &mut past {
-                project(motion, constraints, g, &mut projection, &closed)?;
+                project(motion, &mut self.constraints, &self.g, &mut projection, &closed)?;
             }
         }
         Ok(past)
-    }
-
-    /// Starts again from the displacements and velocities of the present state, after a discontinuity known to the
-    /// host (a load or a support that jumps): accelerations are computed from the balance after it, contacts at rest
-    /// are found again, and the past is computed as at the start.
-    ///
-    /// ```
-    /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
-    ///
-    /// // A mass under a force that is switched on at t = 1.
-    /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
-    /// let system = LinearSystem::lumped(vec![1.0], k)?.load(|t, f| f[0] = if t < 1.0 - 1e-9 { 0.0 } else { 3.0 });
-    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build()?;
-    /// run.land_on(1.0 - 1e-8, &mut ())?; // before the jump
-    /// run.land_on(1.0, &mut ())?; // over it
-    /// run.restart()?; // and begin again behind it
-    /// assert!((run.state().acceleration()[0] - 3.0).abs() < 1e-12);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// Errors of building a simulation from this state. The simulation is then as it was.
-    pub fn restart(&mut self) -> Result<()> {
-        self.guarded(|run| {
-            let result = run.begin_anew();
-            run.together.finish(result)
-        })
-    }
-
-    fn begin_anew(&mut self) -> Result<()> {
-        let (h, t) = (self.history.clock.h, self.time());
-        let Self { system, constraints, g, contact_solver, correctors, scheme, startup, state, .. } = self;
-        let (history, work) = (&mut self.history, &mut self.work);
-        let is_smooth = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
-        let massless = &work.massless[..];
-        let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
-        let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
-        let (system, contact_solver) = (&mut **system, &mut **contact_solver);
-        let start = Start {
-            system: &mut *system,
-            contact_solver: &mut *contact_solver,
-            scheme,
-            together: &self.together,
-            h,
-            t,
-            massless,
-            balanced: Balanced::Massless,
-            is_smooth,
-        };
-        let Begun { state: mut begun, history: past, .. } =
-            start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
-        work.contact.rows.problem.reserved = constraints.room().min(FORESEEN);
-        contact_solver.reserve(work.contact.rows.problem.reserved);
-        let depth = scheme.depth;
-        if past.known < depth && startup.is_none() {
-            let (interface, unit) = (constraints.interface(), Unit::of(constraints));
-            let at = At::state(&begun.motion);
-            let mut compiler = Compiler { system: &mut *system, solver: &*self.linear_solver, h, at, interface, unit };
-            let program = compiler.start(&scheme.derived.starter, &scheme.tableau)?;
-            self.statistics.factorizations += program.operators.len() as u64;
-            *startup = Some(program);
-        } else if past.known == depth {
-            *startup = None;
-        }
-        if let Some(ledger) = &mut self.ledger {
-            ledger.restart(system, &begun, (constraints, g))?;
-        }
-        begun.broken = std::mem::take(&mut state.broken);
-        let (pace, clock) = (history.pace, history.clock);
-        (*state, *history) = (begun, past);
-        (history.pace, history.clock) = (pace, clock);
-        Ok(())
     }
 }
 
@@ -308,16 +235,16 @@ struct Node<'h, T> {
 }
 
 /// The motions computed since a contact last closed or opened, newest first.
-fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<Node<'h, T>> {
+fn smooth_motions<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<Node<'h, T>> {
     let newest = std::iter::once((&state.motion, history.made_with));
     let smooth = history.smooth;
-    let known: Vec<(&Motion<T>, f64)> = match history.trail.is_empty() {
+    let known: Vec<(&Motion<T>, f64)> = match history.computed.is_empty() {
         // Until the step changes for the first time, the past that the scheme reads is the computed one.
         true => {
             let past = history.slots[1..history.known].iter().map(|motion| (motion, history.made_with));
             newest.chain(past).take(smooth).collect()
         }
-        false => newest.chain(history.trail.known()).take(smooth).collect(),
+        false => newest.chain(history.computed.known()).take(smooth).collect(),
     };
     let mut age = 0.0;
     let node = |(motion, made_with): (&'h Motion<T>, f64)| {
@@ -329,41 +256,41 @@ fn computed<'h, T: Real>(state: &'h State<T>, history: &'h History<T>) -> Vec<No
 }
 
 /// Number of computed motions to keep: enough for ratios of step sizes up to 3.
-pub(crate) fn trail_length(scheme: &Scheme<'_>) -> usize {
+pub(crate) fn computed_capacity(scheme: &Scheme<'_>) -> usize {
     let shifted = scheme.shifts.iter().any(|shift| shift.abs() > 0.0);
     if scheme.depth > 1 { 3 * (scheme.depth - 1) } else { usize::from(shifted) }
 }
 
 /// Begins to keep the computed motions.
-fn keep_trail<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
-    let length = trail_length(scheme);
-    if history.trail.is_empty() && length > 0 {
+fn keep_computed<T: Real>(scheme: &Scheme<'_>, state: &State<T>, history: &mut History<T>) {
+    let length = computed_capacity(scheme);
+    if history.computed.is_empty() && length > 0 {
         // One-step schemes read no past, but the motion before the present one is still in its slot.
         let known = history.known.max(history.smooth.min(2));
         let past: Vec<_> = history.slots[1..known].iter().map(|motion| (motion, history.made_with)).collect();
-        history.trail = Trail::new(length, state.motion.u.len(), &past);
+        history.computed = ComputedMotions::new(length, state.motion.u.len(), &past);
     }
 }
 
 /// Moves stored v and a of schemes that store them δ steps away from the state: δ steps are another time with the new
 /// step size. The moved values are on the line through the last two computed values.
 fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mut History<T>, h: f64) {
-    let History { trail, unmoved, made_with, smooth, .. } = history;
-    let Some((previous, previous_h)) = trail.known().next().filter(|_| *smooth > 1) else { return };
+    let History { computed, unshifted, made_with, smooth, .. } = history;
+    let Some((previous, previous_h)) = computed.known().next().filter(|_| *smooth > 1) else { return };
     // Far extrapolation along a line is no estimate: stored values stay, as at the start.
-    let moved = if h <= FARTHEST * (1.0 + 1e-9) * *made_with { h - *made_with } else { 0.0 };
-    for (field, (shift, unmoved)) in (1..).zip(scheme.shifts.into_iter().zip(unmoved)) {
+    let moved = if h <= FARTHEST * (1.0 + TIME_SHARE) * *made_with { h - *made_with } else { 0.0 };
+    for (field, (shift, unshifted)) in (1..).zip(scheme.shifts.into_iter().zip(unshifted)) {
         if shift == 0.0 {
             continue;
         }
         let stored = state.motion.rate_mut(field);
-        if unmoved.is_empty() {
-            unmoved.clone_from(stored);
+        if unshifted.is_empty() {
+            unshifted.clone_from(stored);
         }
         let distance = *made_with + shift * (*made_with - previous_h);
         let fraction = T::of(shift * moved / distance);
-        stored.copy_from_slice(unmoved);
-        T::axpy_difference(fraction, unmoved, previous.field(field), stored);
+        stored.copy_from_slice(unshifted);
+        T::axpy_difference(fraction, unshifted, previous.field(field), stored);
     }
 }
 
@@ -401,7 +328,7 @@ fn shifted(psi: &[[f64; 3]]) -> [f64; 2] {
 
 /// Whether ψ reads only accelerations of the past (Adams formulas) and needs no shift: these enter with h a.
 fn reads_accelerations_alone(psi: &[[f64; 3]]) -> bool {
-    shifted(psi).into_iter().all(|by| by.abs() < 1e-6)
+    shifted(psi).into_iter().all(|by| by.abs() < COEFFICIENT)
 }
 
 /// Shifts the resampled past so that the scheme's momentum continues from before the change.
@@ -423,14 +350,14 @@ fn conserve_momentum<T: Real>(
         return;
     }
     let newest = &state.motion;
-    let mut miss = scheme.momentum(newest, &history.slots[1..history.known], history.clock.h);
-    T::axpy(T::of(p * (h - history.clock.h)), &newest.a, &mut miss);
-    T::axpy(-T::one(), &scheme.momentum(newest, past, h), &mut miss);
+    let mut difference = scheme.momentum(newest, &history.slots[1..history.known], history.clock.h);
+    T::axpy(T::of(p * (h - history.clock.h)), &newest.a, &mut difference);
+    T::axpy(-T::one(), &scheme.momentum(newest, past, h), &mut difference);
     for (k, motion) in (1_u32..).zip(past) {
         if by_u.abs() >= by_v.abs() {
-            T::axpy(T::of(-f64::from(k) * h / by_u), &miss, &mut motion.u);
+            T::axpy(T::of(-f64::from(k) * h / by_u), &difference, &mut motion.u);
         } else {
-            T::axpy(T::of(by_v.recip()), &miss, &mut motion.v);
+            T::axpy(T::of(by_v.recip()), &difference, &mut motion.v);
         }
     }
 }

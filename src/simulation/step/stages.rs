@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::build::program::CompiledStage;
 use crate::simulation::build::workspace::{CorrectionWork, Workspace};
-use crate::simulation::run::Simulation;
+use crate::simulation::run::{Parts, Simulation};
 use crate::simulation::stage::contact::closing::Booking;
 use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::{Host, StageSolve};
@@ -14,11 +14,12 @@ use crate::tableau::impulse_weight;
 impl<T: Real> Simulation<'_, T> {
     /// Takes all stages of a step. On entry slot 0 of the history holds the current motion.
     pub(super) fn take_stages(&mut self) -> Result<()> {
-        let Self { system, constraints, g, contact_solver, correctors, history, work, statistics, together, .. } = self;
-        let (program, start_covector) = match &mut self.startup {
+        let Self { parts, compiled, constraints, g, history, work, statistics, .. } = self;
+        let Parts { system, contact_solver, correctors, together, .. } = parts;
+        let (program, start_covector) = match &mut compiled.startup {
             // After the step one more state is known than now.
             Some(startup) => (startup, Some(&self.scheme.derived.covectors[history.known])),
-            None => (&mut self.program, None),
+            None => (&mut compiled.program, None),
         };
         let (clock, stages) = (history.clock, program.stages.len());
         for (place, stage) in program.stages.iter().enumerate() {

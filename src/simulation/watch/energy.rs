@@ -9,8 +9,9 @@ use crate::real::Real;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::run::results::{Energy, Works, finite};
 use crate::simulation::start;
+use crate::simulation::watch::StepData;
 use crate::simulation::watch::impacts::Impacts;
-use crate::state::{ContactState, State};
+use crate::state::State;
 use crate::system::System;
 use std::ops::Range;
 
@@ -20,56 +21,78 @@ use std::ops::Range;
 pub(crate) struct Ledger<T: Real> {
     together: Together<T>,
     works: Works<T>,
+    /// The total energy at the start of the run.
     start: T,
-    load: Vec<T>,
-    old_load: Vec<T>,
+    /// Displacements at the start of the step.
     old_u: Vec<T>,
     residual: Vec<T>,
-    power: T,
     /// Whether there are supports, on any rank: their forces are computed from the balance.
     is_supported: bool,
-    reactions: Vec<T>,
-    next_reactions: Vec<T>,
-    /// Gᵀ λ at the start and at the end of a step, one entry a dof.
-    contact: Vec<T>,
-    next_contact: Vec<T>,
-    /// The same for friction; empty as long as there is none.
-    friction: Vec<T>,
-    next_friction: Vec<T>,
+    before: Forces<T>,
+    after: Forces<T>,
     impacts: Impacts<T>,
     /// Reported forces along the rows where they act.
-    forces: Vec<T>,
-    /// The same for springs with dashpots; empty as long as there are none.
+    row_forces: Vec<T>,
+    /// Works at the end of a step that is not accepted yet.
+    next_works: Works<T>,
+}
+
+/// Forces at one end of a step, one entry a dof.
+#[derive(Debug)]
+struct Forces<T> {
+    load: Vec<T>,
+    /// Of the supports, one entry a prescribed dof.
+    reactions: Vec<T>,
+    /// Gᵀ λ along the gaps.
+    contact: Vec<T>,
+    /// The same for friction, and for springs with dashpots; empty as long as there are none.
+    friction: Vec<T>,
     damped: Vec<T>,
-    next_damped: Vec<T>,
-    /// The energy stored in these springs at the start of a step.
+    /// The energy stored in these springs, and the power of damping.
     stored: T,
-    /// Works, damping power and stored energy at the end of a step that is not accepted yet.
-    next: (Works<T>, T, T),
+    power: T,
+}
+
+impl<T: Real> Forces<T> {
+    fn new(dofs: usize, supports: usize) -> Self {
+        let [load, contact] = [(); 2].map(|()| vec![T::zero(); dofs]);
+        let (reactions, zero) = (vec![T::zero(); supports], T::zero());
+        Self { load, reactions, contact, friction: Vec::new(), damped: Vec::new(), stored: zero, power: zero }
+    }
+
+    /// Memory for the forces that these constraints have.
+    fn make_room(&mut self, constraints: &Constraints<'_, T>) {
+        let dofs = self.contact.len();
+        if !constraints.tangents().is_empty() {
+            self.friction.resize(dofs, T::zero());
+        }
+        if constraints.laws().damped {
+            self.damped.resize(dofs, T::zero());
+        }
+    }
+
+    /// Sets the forces of contact to zero.
+    fn clear(&mut self) {
+        [&mut self.contact, &mut self.friction, &mut self.damped].into_iter().for_each(|forces| forces.fill(T::zero()));
+        self.stored = T::zero();
+    }
+
+    /// Adds the force of a row of `g`.
+    fn add(&mut self, (constraints, g): Rows<'_, '_, T>, row: usize, force: T, gap: impl Fn() -> T) {
+        let forces = if g.is_tangential(row) {
+            &mut self.friction
+        } else if constraints.laws()[row].is_damped() {
+            self.stored += constraints.laws()[row].stored(gap());
+            &mut self.damped
+        } else {
+            &mut self.contact
+        };
+        g.scatter(row, force, forces);
+    }
 }
 
 /// The constraints and their rows of G.
 pub(crate) type Rows<'r, 'a, T> = (&'r Constraints<'a, T>, &'r ContactJacobian<T>);
-
-/// The data of a step that the ledger reads.
-pub(crate) struct StepBooks<'a, T> {
-    pub(crate) t: f64,
-    /// u, v and a at the time of the state.
-    pub(crate) motion: [&'a [T]; 3],
-    pub(crate) contacts: &'a ContactState<T>,
-    /// The rows of the gaps, and the rows along which the reported forces act.
-    pub(crate) g: &'a ContactJacobian<T>,
-    pub(crate) forces: &'a ContactJacobian<T>,
-    /// The fraction of the step at which those forces act.
-    pub(crate) load: f64,
-    /// The closed contacts with mass that leave jumps, which contacts were closed at the start of the step, and whether
-    /// correctors remove the jumps.
-    pub(crate) closed: &'a [usize],
-    pub(crate) closed_at_start: &'a [bool],
-    pub(crate) is_corrected: bool,
-    pub(crate) corrections: T,
-    pub(crate) h: f64,
-}
 
 impl<T: Real> Ledger<T> {
     pub(crate) fn new(
@@ -79,34 +102,23 @@ impl<T: Real> Ledger<T> {
         rows: Rows<'_, '_, T>,
     ) -> Result<Self> {
         let projection = start::projection(system, rows.0, (together, solver))?;
-        let zero = || vec![T::zero(); system.dofs()];
-        let [supports] = together.max(Ok([system.prescribed().len() as f64]))?;
+        let (dofs, supports) = (system.dofs(), system.prescribed().len());
+        let [supports_of_all] = together.max(Ok([supports as f64]))?;
+        let energy = energy(system, together, state, None);
+        energy.check(state.time())?;
         let mut ledger = Self {
             together: together.clone(),
             works: Works::default(),
-            start: T::zero(),
-            load: zero(),
-            old_load: zero(),
-            old_u: zero(),
-            residual: zero(),
-            power: T::zero(),
-            is_supported: supports > 0.0,
-            reactions: vec![T::zero(); system.prescribed().len()],
-            next_reactions: vec![T::zero(); system.prescribed().len()],
-            contact: zero(),
-            next_contact: zero(),
-            friction: Vec::new(),
-            next_friction: Vec::new(),
+            start: energy.total(),
+            old_u: vec![T::zero(); dofs],
+            residual: vec![T::zero(); dofs],
+            is_supported: supports_of_all > 0.0,
+            before: Forces::new(dofs, supports),
+            after: Forces::new(dofs, supports),
             impacts: Impacts::new(projection, rows.0.room()),
-            forces: Vec::new(),
-            damped: Vec::new(),
-            next_damped: Vec::new(),
-            stored: T::zero(),
-            next: (Works::default(), T::zero(), T::zero()),
+            row_forces: Vec::new(),
+            next_works: Works::default(),
         };
-        let energy = energy(system, together, state, None);
-        energy.check(state.time())?;
-        ledger.start = energy.total();
         ledger.restart(system, state, rows)?;
         Ok(ledger)
     }
@@ -118,38 +130,22 @@ impl<T: Real> Ledger<T> {
         state: &State<T>,
         rows: Rows<'_, '_, T>,
     ) -> Result<()> {
+        let (t, contacts) = (state.time(), &state.contacts);
+        self.after.make_room(rows.0);
+        self.after.clear();
         // Without supports a state is evaluated neither in a step nor here: a run continues with stored data.
-        let reactions = if self.is_supported { reactions(system, state, rows)? } else { Vec::new() };
-        let power = self.damping_power(system, state.displacement(), state.velocity())?;
-        system.external_load(state.time(), &mut self.old_load)?;
-        let sums = [reactions.iter().copied().sum(), power, self.old_load.iter().copied().sum()];
-        for (what, value) in ["the force of the supports", "the power of damping", "the load"].into_iter().zip(sums) {
-            finite(state.time(), what, value)?;
+        if self.is_supported {
+            self.after.reactions = reactions(system, state, rows)?;
         }
-        (self.reactions, self.power) = (reactions, power);
-        std::mem::swap(&mut self.load, &mut self.old_load);
-        let (constraints, g) = rows;
-        self.contact.fill(T::zero());
-        if !constraints.tangents().is_empty() {
-            self.friction.resize(self.contact.len(), T::zero());
+        self.after.power = self.damping_power(system, state.displacement(), state.velocity())?;
+        system.external_load(t, &mut self.after.load)?;
+        finite(t, "the force of the supports", self.after.reactions.iter().copied().sum::<T>())?;
+        finite(t, "the power of damping", self.after.power)?;
+        finite(t, "the load", self.after.load.iter().copied().sum::<T>())?;
+        for (contact, row) in rows.0.all_rows_of(contacts) {
+            self.after.add(rows, row, contacts.lambda[contact], || contacts.gap[contact]);
         }
-        self.friction.fill(T::zero());
-        if constraints.laws().damped {
-            self.damped.resize(self.contact.len(), T::zero());
-        }
-        self.damped.fill(T::zero());
-        self.stored = T::zero();
-        for (contact, row) in constraints.all_rows_of(&state.contacts) {
-            let forces = if g.is_tangential(row) {
-                &mut self.friction
-            } else if constraints.laws()[row].is_damped() {
-                self.stored += constraints.laws()[row].stored(state.contacts.gap[contact]);
-                &mut self.damped
-            } else {
-                &mut self.contact
-            };
-            g.scatter(row, state.contacts.lambda[contact], forces);
-        }
+        std::mem::swap(&mut self.before, &mut self.after);
         Ok(())
     }
 
@@ -175,87 +171,77 @@ impl<T: Real> Ledger<T> {
         &mut self,
         system: &mut dyn System<T>,
         constraints: &mut Constraints<'_, T>,
-        books: &StepBooks<'_, T>,
+        data: &StepData<'_, T>,
     ) -> Result<()> {
-        if self.is_supported {
-            balance_residual(system, books.t, books.motion, &books.contacts.lambda, books.g, &mut self.residual)?;
-        }
+        self.evaluate_end(system, constraints, data)?;
+        let Self { together, before, after, old_u, .. } = &*self;
         let half = T::of(0.5);
-        let [u, v, _] = books.motion;
-        let mut works = self.works;
+        let [u, v, _] = data.motion;
         // On ranks, each sum holds the part of this rank.
         let mut by_supports = T::zero();
-        for ((&reaction, next), &dof) in self.reactions.iter().zip(&mut self.next_reactions).zip(system.prescribed()) {
-            *next = self.residual[dof];
-            let mean = half * (reaction + *next);
-            if self.together.owns(dof) {
-                by_supports += mean * (u[dof] - self.old_u[dof]);
+        for ((&old, &new), &dof) in before.reactions.iter().zip(&after.reactions).zip(system.prescribed()) {
+            if together.owns(dof) {
+                by_supports += half * (old + new) * (u[dof] - old_u[dof]);
             }
         }
-        // The load at the end is kept in the spare vector until the step is accepted.
-        system.external_load(books.t, &mut self.old_load)?;
-        let way = [&self.old_u[..], u];
-        let by_loads = self.together.part_of_work(way, |dof| half * (self.load[dof] + self.old_load[dof]));
-        if !books.contacts.tangents.is_empty() && self.friction.is_empty() {
-            self.friction.resize(u.len(), T::zero());
-        }
-        if constraints.laws().damped && self.damped.is_empty() {
-            self.damped.resize(u.len(), T::zero());
-        }
-        self.next_friction.resize(self.friction.len(), T::zero());
-        self.next_damped.resize(self.damped.len(), T::zero());
-        self.next_contact.fill(T::zero());
-        self.next_friction.fill(T::zero());
-        self.next_damped.fill(T::zero());
-        let mut stored = T::zero();
-        self.forces.clone_from(&books.contacts.lambda);
-        let tangents = &books.contacts.tangents;
-        tangents.turn([books.g, books.forces], &mut self.forces[tangents.all()]);
-        for (row, &force) in self.forces.iter().enumerate() {
-            let forces = if books.forces.is_tangential(row) {
-                &mut self.next_friction
-            } else if constraints.laws()[row].is_damped() {
-                stored += constraints.laws()[row].stored(books.contacts.gap[row]);
-                &mut self.next_damped
-            } else {
-                &mut self.next_contact
-            };
-            books.forces.scatter(row, force, forces);
-        }
+        let ends = [&old_u[..], u];
+        let by_loads = together.part_of_work(ends, |dof| half * (before.load[dof] + after.load[dof]));
         // The force in the middle of the step, on the line through the forces of two steps.
-        let newest = T::of(1.5 - books.load);
+        let newest = T::of(1.5 - data.load);
         let work = |old: &[T], new: &[T]| match new.is_empty() {
             true => T::zero(),
-            false => self.together.part_of_work(way, |dof| old[dof] + newest * (new[dof] - old[dof])),
+            false => together.part_of_work(ends, |dof| old[dof] + newest * (new[dof] - old[dof])),
         };
-        let (by_contact, by_friction) =
-            (work(&self.contact, &self.next_contact), work(&self.friction, &self.next_friction));
-        let by_damped = work(&self.damped, &self.next_damped);
+        let by_contact = work(&before.contact, &after.contact);
+        let by_friction = work(&before.friction, &after.friction);
+        let by_damped = work(&before.damped, &after.damped);
+        // The work of springs that is not stored elastically belongs to the dashpots.
+        let kept = after.stored - before.stored;
         let parts = [by_supports, by_loads, by_contact, by_friction, by_damped].map(T::value);
-        let [by_supports, by_loads, by_contact, by_friction, by_damped] = self.together.sum(Ok(parts))?.map(T::of);
+        let [by_supports, by_loads, by_contact, by_friction, by_damped] = together.sum(Ok(parts))?.map(T::of);
+        let hidden = self.impacts.works(constraints, data, &self.row_forces, (&self.old_u, newest))?;
+        self.after.power = self.damping_power(system, u, v)?;
+        let mut works = self.works;
         works.supports += by_supports;
         works.load += by_loads;
-        let hidden = self.impacts.works(constraints, books, &self.forces, (&self.old_u, newest))?;
-        // The work of springs that is not stored elastically belongs to the dashpots.
-        let kept = stored - self.stored;
         works.contact += by_contact + hidden.contact - kept;
         works.friction += by_friction + hidden.friction;
         works.impacts += hidden.impacts;
-        works.corrections += books.corrections;
-        let power = self.damping_power(system, u, v)?;
-        works.damping += half * (self.power + power) * T::of(books.h) + by_damped + kept;
-        self.next = (works, power, stored);
-        works.check(books.t)
+        works.corrections += data.corrections;
+        works.damping += half * (self.before.power + self.after.power) * T::of(data.h) + by_damped + kept;
+        self.next_works = works;
+        works.check(data.t)
+    }
+
+    /// Evaluates the forces at the end of a step, except damping.
+    fn evaluate_end(
+        &mut self,
+        system: &mut dyn System<T>,
+        constraints: &Constraints<'_, T>,
+        data: &StepData<'_, T>,
+    ) -> Result<()> {
+        let Self { before, after, residual, row_forces, .. } = self;
+        if self.is_supported {
+            balance_residual(system, data.t, data.motion, &data.contacts.lambda, data.g, residual)?;
+            after.reactions.iter_mut().zip(system.prescribed()).for_each(|(force, &dof)| *force = residual[dof]);
+        }
+        system.external_load(data.t, &mut after.load)?;
+        before.make_room(constraints);
+        after.make_room(constraints);
+        after.clear();
+        row_forces.clone_from(&data.contacts.lambda);
+        let tangents = &data.contacts.tangents;
+        tangents.turn([data.g, data.forces], &mut row_forces[tangents.all()]);
+        for (row, &force) in row_forces.iter().enumerate() {
+            after.add((constraints, data.forces), row, force, || data.contacts.gap[row]);
+        }
+        Ok(())
     }
 
     /// Stores the results of [`prepare`](Self::prepare) for an accepted step.
     pub(crate) fn end(&mut self) {
-        (self.works, self.power, self.stored) = self.next;
-        std::mem::swap(&mut self.load, &mut self.old_load);
-        std::mem::swap(&mut self.reactions, &mut self.next_reactions);
-        std::mem::swap(&mut self.contact, &mut self.next_contact);
-        std::mem::swap(&mut self.friction, &mut self.next_friction);
-        std::mem::swap(&mut self.damped, &mut self.next_damped);
+        self.works = self.next_works;
+        std::mem::swap(&mut self.before, &mut self.after);
     }
 
     fn works(&self, total: T) -> Works<T> {

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::watch::energy::StepBooks;
+use crate::simulation::watch::StepData;
 use crate::state::State;
 
 /// Contacts at the start of a step, and memory for their changes in it.
@@ -72,13 +72,13 @@ impl<T: Real> Impacts<T> {
     pub(crate) fn works(
         &mut self,
         constraints: &mut Constraints<'_, T>,
-        books: &StepBooks<'_, T>,
+        data: &StepData<'_, T>,
         lambda: &[T],
         (from, newest): (&[T], T),
     ) -> Result<Hidden<T>> {
         let mut works = Hidden { impacts: T::zero(), contact: T::zero(), friction: T::zero() };
-        let StepBooks { t, motion: [u, v, _], contacts, g, forces, closed, closed_at_start, is_corrected, h, .. } =
-            *books;
+        let StepData { t, motion: [u, v, _], contacts, g, forces, closed, closed_at_start, is_corrected, h, .. } =
+            *data;
         if constraints.len() == 0 || closed.is_empty() {
             return Ok(works);
         }

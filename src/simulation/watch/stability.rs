@@ -6,6 +6,7 @@ use crate::mass::{InverseMass, Mass};
 use crate::memory;
 use crate::ranks::Together;
 use crate::real::Real;
+use crate::rounding::{CRITICAL_ACCURACY, FREQUENCY_ACCURACY, half_digits, rounding};
 use crate::simulation::build::scheme::Scheme;
 use crate::sparse::{self, Product, Symmetry};
 use crate::state::Motion;
@@ -28,16 +29,10 @@ pub(crate) enum StepLimit {
 const ITERATIONS: usize = 40;
 
 /// The estimate is evaluated after these numbers of iterations.
-const LOOKS: [usize; 8] = [3, 6, 9, 13, 18, 24, 31, ITERATIONS];
-
-/// Relative accuracy of the square of the highest frequency, when an error names the largest stable step.
-const ACCURACY: f64 = 2e-3;
+const EVALUATED: [usize; 8] = [3, 6, 9, 13, 18, 24, 31, ITERATIONS];
 
 /// An estimate counts as below a limit if it is below by this multiple of its residual.
 const RESERVE: f64 = 4.0;
-
-/// Relative accuracy of the critical Ω: roots are double there, and accurate to the square root of rounding only.
-const SLIVER: f64 = 1e-7;
 
 /// Refuses tableaux that do not converge to the equation of motion as the step decreases.
 pub(crate) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
@@ -58,7 +53,7 @@ pub(crate) fn check_scheme(scheme: &Scheme<'_>) -> Result<()> {
 /// Ω up to which a scheme is stable without damping; none if it is stable at every frequency.
 pub(crate) fn critical(scheme: &Scheme<'_>) -> Option<f64> {
     // Explicit schemes have no radius at infinite frequency.
-    if scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + 1e-6) {
+    if scheme.derived.radius_at_infinity.is_some_and(|radius| radius <= 1.0 + CRITICAL_ACCURACY) {
         return None;
     }
     scheme.derived.critical(&scheme.tableau)
@@ -66,7 +61,7 @@ pub(crate) fn critical(scheme: &Scheme<'_>) -> Option<f64> {
 
 /// The factor by which steps may exceed the limit, within its accuracy.
 pub(crate) fn allowance<T: Real>() -> f64 {
-    1.0 + SLIVER.max(64.0 * T::epsilon().value())
+    1.0 + CRITICAL_ACCURACY + rounding(T::one()).value()
 }
 
 /// Bounds of the square of the highest frequency of a system with an additional force, whose product with a vector
@@ -123,17 +118,15 @@ pub(crate) fn check_step<T: Real>(
         };
     }
     let mut lanczos = Lanczos::new(system)?;
-    let mut even = None;
     let highest = if let Some(omega) = system.highest_frequency() {
         Highest { at_least: omega * omega, at_most: omega * omega }
     } else {
         let Some(mut stiffness) = Stiffness::of(system, motion)? else { return Ok(StepLimit::Cleared(h)) };
-        if let Some(circles) = stiffness.circles(system, &lanczos.inverse) {
-            let largest = critical / circles.largest.value().sqrt();
-            if h <= largest * allowance && !lags {
+        if !lags && let Some(square) = stiffness.circles(system, &lanczos.inverse) {
+            let largest = critical / square.sqrt();
+            if h <= largest * allowance {
                 return Ok(StepLimit::Cleared(h.max(largest)));
             }
-            even = Some(std::mem::replace(&mut lanczos.start, circles.rows));
         }
         if !stiffness.is_symmetric() {
             // Ritz values are no bounds for unsymmetric matrices.
@@ -145,8 +138,7 @@ pub(crate) fn check_step<T: Real>(
     let mut strongest = 0.0;
     if lags {
         // The highest mode is assumed to have the strongest damping of all modes: exact for Rayleigh damping, on the
-        // safe side otherwise. Damping may act where no stiffness does.
-        lanczos.start = even.unwrap_or(lanczos.start);
+        // safe side otherwise.
         let still = vec![T::zero(); system.dofs()];
         let damping = lanczos.highest(system, 0.0, |system, x, y| match system.damping_force() {
             Some(damping) => damping.evaluate(&still, x, y),
@@ -192,7 +184,7 @@ fn frequency_over_ranks<T: Real>(
     let circles = Stiffness::of(system, motion).and_then(|stiffness| {
         let inverse = InverseMass::new(system.mass(), system.prescribed(), &[]);
         let circles = stiffness.map(|stiffness| Ok(stiffness.circles(system, &inverse?))).transpose()?.flatten();
-        Ok([circles.map_or(f64::INFINITY, |circles| circles.largest.value())])
+        Ok([circles.unwrap_or(f64::INFINITY)])
     });
     match together.max(circles)? {
         [square] if square.is_finite() => Ok(square.sqrt()),
@@ -221,13 +213,6 @@ enum Stiffness<'s, T: Real> {
     Force { at: &'s Motion<T>, force: Vec<T>, size: T, moved: Vec<T> },
 }
 
-/// Gershgorin's bound of ω².
-struct Circles<T> {
-    /// √(Σ_j |K_ij|/m_i) over √m_i for each dof: large where the eigenvector of the highest frequency may be large.
-    rows: Vec<T>,
-    largest: T,
-}
-
 impl<'s, T: Real> Stiffness<'s, T> {
     /// The tangent, if the system has one, otherwise its force. None for nonlinear forces at zero displacements,
     /// which define no length for a difference.
@@ -244,9 +229,7 @@ impl<'s, T: Real> Stiffness<'s, T> {
         }
         let size = match system.linearity() {
             Linearity::Linear => T::one(),
-            Linearity::Nonlinear => {
-                at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs())) * T::epsilon().sqrt()
-            }
+            Linearity::Nonlinear => at.u.iter().fold(T::zero(), |largest, u| largest.max(u.abs())) * half_digits(),
         };
         let mut force = vec![T::zero(); dofs];
         match size > T::zero() {
@@ -262,8 +245,8 @@ impl<'s, T: Real> Stiffness<'s, T> {
         !matches!(self, Self::Matrix { product: Product::General, .. })
     }
 
-    /// The circles of M⁻¹ K on the dofs with a response, for a lumped mass and a matrix.
-    fn circles(&self, system: &dyn System<T>, inverse: &InverseMass<T>) -> Option<Circles<T>> {
+    /// Gershgorin's bound of ω² by the circles of M⁻¹ K, for a lumped mass and a matrix.
+    fn circles(&self, system: &dyn System<T>, inverse: &InverseMass<T>) -> Option<f64> {
         let (Self::Matrix { values, .. }, InverseMass::Lumped(inverse)) = (self, inverse) else { return None };
         let pattern = system.pattern();
         let mut rows = vec![T::zero(); inverse.len()];
@@ -272,13 +255,8 @@ impl<'s, T: Real> Stiffness<'s, T> {
                 rows[row] += value.abs();
             }
         }
-        let mut largest = T::zero();
-        for (row, &inverse) in rows.iter_mut().zip(inverse) {
-            let square = *row * inverse;
-            largest = largest.max(square);
-            *row = (square * inverse).sqrt();
-        }
-        largest.is_finite().then_some(Circles { rows, largest })
+        let largest = rows.iter().zip(inverse).fold(T::zero(), |largest, (&row, &inverse)| largest.max(row * inverse));
+        largest.is_finite().then_some(largest.value())
     }
 
     /// `y = K x`.
@@ -328,7 +306,8 @@ impl<T: Real> Lanczos<T> {
         Ok(Self { inverse, start, vectors: std::array::from_fn(|_| vec![T::zero(); dofs]) })
     }
 
-    /// The highest eigenvalue, accurate enough to compare it with `limit`, and to [`ACCURACY`] if it is above.
+    /// The highest eigenvalue, accurate enough to compare it with `limit`, and to [`FREQUENCY_ACCURACY`] if it is
+    /// above.
     fn highest(
         &mut self,
         system: &mut dyn System<T>,
@@ -375,11 +354,11 @@ impl<T: Real> Lanczos<T> {
             }
             next.copy_from_slice(image);
             inverse.apply(next)?;
-            if LOOKS.contains(&iteration) {
+            if EVALUATED.contains(&iteration) {
                 let beta = dot(image, next).max(T::zero()).sqrt().value();
                 found = ritz(&diagonal, &beside, beta);
                 let miss = found.at_most - found.at_least;
-                let known = found.at_least > limit && miss <= ACCURACY * found.at_least;
+                let known = found.at_least > limit && miss <= FREQUENCY_ACCURACY * found.at_least;
                 // With some reserve, as a higher eigenvalue may not have been found yet.
                 if known || found.at_least + RESERVE * miss <= limit {
                     return Ok(found);
@@ -387,7 +366,7 @@ impl<T: Real> Lanczos<T> {
             }
         }
         // An invariant subspace was found, or the iterations are spent.
-        if !LOOKS.contains(&diagonal.len()) && !diagonal.is_empty() {
+        if !EVALUATED.contains(&diagonal.len()) && !diagonal.is_empty() {
             found = ritz(&diagonal, &beside[..diagonal.len() - 1], 0.0);
         }
         Ok(found)
