@@ -28,10 +28,9 @@ use crate::simulation::run::results::Statistics;
 use crate::simulation::stage::newton::{Newton, NewtonWork};
 use crate::simulation::stage::path::PathWork;
 use crate::simulation::stage::supports::put_initial_supports;
-use crate::simulation::start::massless::Balanced;
 use crate::simulation::start::rate_check::RateCheck;
 use crate::simulation::start::resumed::Resumed;
-use crate::simulation::start::{self, Begun, InitialOverclosure, Start, Violation};
+use crate::simulation::start::{self, Begun, InitialOverclosure, Origin, Start};
 use crate::simulation::step::judge::{Judge, StepControl};
 use crate::simulation::watch::energy::Ledger;
 use crate::simulation::watch::stability::{self, StepLimit};
@@ -60,7 +59,7 @@ pub struct SimulationBuilder<'a, T: Real> {
     balance: EnergyBalance,
     stability: Stability,
     overclosure: InitialOverclosure,
-    balanced: Balanced,
+    is_at_rest: bool,
 }
 
 /// Whether the default corrector is added, or correctors were chosen.
@@ -127,7 +126,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             balance: EnergyBalance::Off,
             stability: Stability::Checked,
             overclosure: InitialOverclosure::Refused,
-            balanced: Balanced::Massless,
+            is_at_rest: false,
         }
     }
 
@@ -334,7 +333,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// ```
     #[must_use]
     pub fn start_at_rest(mut self) -> Self {
-        self.balanced = Balanced::All;
+        self.is_at_rest = true;
         self
     }
 
@@ -396,7 +395,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     }
 
     fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
-        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, balanced, .. } = self;
+        let Self { mut system, integrator, h, t, u, v, constraints, mut contact_solver, .. } = self;
         step_size::<T>(h)?;
         check_times(t, self.overclosure)?;
         self.resumed.as_ref().map_or_else(|| Clock::new(t, h), Resumed::clock).check()?;
@@ -436,10 +435,20 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
             Begun { state, history, adjustment: None }
         } else {
-            let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
-            let start =
-                Start { system, contact_solver, scheme: &scheme, together, h, t, massless, balanced, is_smooth };
-            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Initial(self.overclosure))?
+            let start = Start {
+                system: &mut *system,
+                contact_solver: &mut *contact_solver,
+                constraints: &mut constraints,
+                g: &mut g,
+                projection: &mut projection,
+                scheme: &scheme,
+                together,
+                h,
+                massless: &massless,
+                origin: Origin::Initial { overclosure: self.overclosure, is_at_rest: self.is_at_rest },
+                is_smooth,
+            };
+            start.begin(Motion { t, a: vec![T::zero(); dofs], u, v })?
         };
         let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;

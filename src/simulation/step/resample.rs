@@ -12,9 +12,8 @@ use crate::simulation::operator::responses::Unit;
 use crate::simulation::operator::tangent::At;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::run::Simulation;
-use crate::simulation::start::massless::Balanced;
 use crate::simulation::start::past::taylor;
-use crate::simulation::start::{self, Begun, Start, Violation};
+use crate::simulation::start::{self, Begun, Origin, Start};
 use crate::simulation::watch::stability::{self, StepLimit};
 use crate::state::{History, Motion, Pace, State, Trail};
 use crate::system::Linearity;
@@ -226,8 +225,8 @@ impl<T: Real> Simulation<'_, T> {
     }
 
     /// Starts again from the displacements and velocities of the present state, after a discontinuity known to the
-    /// host (a load or a support that jumps): accelerations are computed from the balance after it, contacts at rest
-    /// are found again, and the past is computed as at the start.
+    /// host (a load or a support that jumps): dofs without mass are brought into static balance, accelerations are
+    /// computed from the balance after it, contacts at rest are found again, and the past is computed as at the start.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -261,21 +260,28 @@ impl<T: Real> Simulation<'_, T> {
         let is_smooth = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
+        let motion = Motion { t, a: vec![T::zero(); u.len()], u, v };
         let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
         let (system, contact_solver) = (&mut **system, &mut **contact_solver);
         let start = Start {
             system: &mut *system,
             contact_solver: &mut *contact_solver,
+            constraints,
+            g,
+            projection: &mut projection,
             scheme,
             together: &self.together,
             h,
-            t,
             massless,
-            balanced: Balanced::Massless,
+            origin: Origin::Restart,
             is_smooth,
         };
-        let Begun { state: mut begun, history: past, .. } =
-            start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
+        let started = start.begin(motion);
+        if started.is_err() {
+            // The rows belong to the state again.
+            constraints.search(&state.motion, scheme.ahead() * h, g).ok();
+        }
+        let Begun { state: mut begun, history: past, .. } = started?;
         work.contact.rows.reserved = constraints.room().min(FORESEEN);
         contact_solver.reserve(work.contact.rows.reserved);
         let depth = scheme.depth;
