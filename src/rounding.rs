@@ -24,7 +24,8 @@ pub(crate) fn share_of_rounding<T: Float>() -> T {
 }
 
 /// √ε, half of the digits: values that agree to this share agree as far as solves with a matrix of unknown condition
-/// can tell. Distances below this share of the size of a facet have no direction; entries of a rotation differ by less
+/// can tell; the share by which values are changed for a difference that keeps half of the digits, and by which rounding
+/// may move a solved force beyond its bound. Distances below this share of the size of a facet have no direction; entries of a rotation differ by less
 /// from those of an orthonormal matrix.
 pub(crate) fn half_digits<T: Float>() -> T {
     T::epsilon().sqrt()
@@ -150,3 +151,18 @@ pub(crate) const TIME_SHARE: f64 = 1e-9;
 pub(crate) fn time_resolution(t: f64) -> f64 {
     t.abs().next_up() - t.abs()
 }
+
+// Start.
+
+/// What the input may add to a gap with this rounding: coordinates may have been written to a file with twelve digits.
+/// A length.
+pub(crate) fn rounding_of_input<T: Float>(rounded: T) -> T {
+    number::<T>(64.0) * rounded
+}
+
+/// The share of a step by which the time of a resumed state may differ from the end of its history.
+pub(crate) const SAME_TIME: f64 = 1e-6;
+
+/// The share of the displacement along a row that a gap may miss before the row counts as turned: hosts may omit turns
+/// that do not matter.
+pub(crate) const TURNED: f64 = 0.01;

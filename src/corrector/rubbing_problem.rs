@@ -355,13 +355,15 @@ impl<T: Real> Group<T> {
             at += 1 + tangents;
         }
         let known = |at: usize| block(at).known.filter(|_| block(at).place == positions[at]);
+        let largest = (0..size).map(|i| s[i * size + i]).fold(T::zero(), T::max);
         for &i in unknowns.iter() {
             let entry = |j: usize| s[j * size + i];
             if let Some(multiplier) = known(i) {
-                // S_ii (λ − known) = 0.
-                offset.push(-entry(i) * multiplier);
+                // S_ii (λ − known) = 0; the normal force may act on dofs without mass alone, where S_ii is zero.
+                let pivot = if entry(i) > T::zero() { entry(i) } else { largest };
+                offset.push(-pivot * multiplier);
                 tolerance.push(T::zero());
-                delassus.extend(unknowns.iter().map(|&j| if i == j { entry(i) } else { T::zero() }));
+                delassus.extend(unknowns.iter().map(|&j| if i == j { pivot } else { T::zero() }));
                 continue;
             }
             let (mut contained, mut terms) = (T::zero(), T::zero());

@@ -23,7 +23,7 @@ use crate::simulation::operator::Operator;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::run::results::{Energy, Statistics};
 use crate::simulation::stage::newton::Iteration;
-use crate::simulation::start::massless::StartAdjustment;
+use crate::simulation::start::balance::StartAdjustment;
 use crate::simulation::step::judge::Judge;
 use crate::simulation::watch::energy::{self, Ledger};
 use crate::simulation::watch::stability::StepLimit;

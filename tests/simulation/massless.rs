@@ -17,6 +17,8 @@ use contact_dynamics_scenes::measure::{figures, record_run};
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{matrix, springs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A mass (dof 0) on a dashpot of force w³ whose other end (dof 1) has none, and another one to the ground.
 struct Dashpots {
@@ -218,6 +220,24 @@ fn a_body_that_stands_on_dofs_without_mass_starts_with_its_weight() {
         run.step().unwrap();
         assert!((run.state().contacts().forces()[0] - weight).abs() < 1e-9 * weight);
     }
+}
+
+/// A force on the foot that is switched on: after a restart the foot is where the spring balances it, and the spring
+/// passes the force on to the mass.
+#[test]
+fn a_load_that_jumps_moves_dofs_without_mass_at_a_restart() {
+    let (force, is_on) = (8.0, Arc::new(AtomicBool::new(false)));
+    let flag = Arc::clone(&is_on);
+    let system = spring_and_mass().load(move |_, f| f[0] = if flag.load(Ordering::Relaxed) { force } else { 0.0 });
+    let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1e-2).velocity(vec![SPEED; 2]).build().unwrap();
+    for _ in 0..5 {
+        run.step().unwrap();
+    }
+    is_on.store(true, Ordering::Relaxed);
+    run.restart().unwrap();
+    let u = run.state().displacement();
+    assert!((u[0] - u[1] - force / STIFFNESS).abs() < 1e-14, "{u:?}");
+    assert!((run.state().acceleration()[1] - force).abs() < 1e-12);
 }
 
 #[test]

@@ -28,10 +28,9 @@ use crate::simulation::run::{Monitors, Parts, Simulation};
 use crate::simulation::stage::newton::{Newton, NewtonWork};
 use crate::simulation::stage::path::PathWork;
 use crate::simulation::stage::supports::put_initial_supports;
-use crate::simulation::start::massless::Balanced;
 use crate::simulation::start::rate_check::RateCheck;
 use crate::simulation::start::resumed::Resumed;
-use crate::simulation::start::{self, Begun, InitialOverclosure, Start, Violation};
+use crate::simulation::start::{self, Begun, InitialOverclosure, Origin, Start};
 use crate::simulation::step::judge::{Judge, StepControl};
 use crate::simulation::watch::energy::Ledger;
 use crate::simulation::watch::stability::{self, StepLimit};
@@ -62,7 +61,7 @@ struct InitialState<T> {
     u: Option<Vec<T>>,
     v: Option<Vec<T>>,
     overclosure: InitialOverclosure,
-    balanced: Balanced,
+    is_at_rest: bool,
 }
 
 /// Settings of the steps.
@@ -114,7 +113,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
                 u: None,
                 v: None,
                 overclosure: InitialOverclosure::Refused,
-                balanced: Balanced::Massless,
+                is_at_rest: false,
             },
             resumed: None,
             settings: Settings {
@@ -330,7 +329,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     /// ```
     #[must_use]
     pub fn start_at_rest(mut self) -> Self {
-        self.initial.balanced = Balanced::All;
+        self.initial.is_at_rest = true;
         self
     }
 
@@ -393,7 +392,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
 
     fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, constraints, mut contact_solver, settings, .. } = self;
-        let InitialState { t, u, v, overclosure, balanced } = self.initial;
+        let InitialState { t, u, v, overclosure, is_at_rest } = self.initial;
         check_step_size::<T>(h)?;
         check_times(t, overclosure)?;
         self.resumed.as_ref().map_or_else(|| Clock::new(t, h), Resumed::clock).check()?;
@@ -433,10 +432,20 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             find_resumed_contacts(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;
             Begun { state, history, adjustment: None }
         } else {
-            let (system, contact_solver, massless) = (&mut *system, &mut *contact_solver, &massless[..]);
-            let start =
-                Start { system, contact_solver, scheme: &scheme, together, h, t, massless, balanced, is_smooth };
-            start.begin(u, v, &mut constraints, &mut g, &mut projection, Violation::Initial(overclosure))?
+            let start = Start {
+                system: &mut *system,
+                contact_solver: &mut *contact_solver,
+                constraints: &mut constraints,
+                g: &mut g,
+                projection: &mut projection,
+                scheme: &scheme,
+                together,
+                h,
+                massless: &massless,
+                origin: Origin::Initial { overclosure: overclosure, is_at_rest: is_at_rest },
+                is_smooth,
+            };
+            start.begin(Motion { t, a: vec![T::zero(); dofs], u, v })?
         };
         let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;

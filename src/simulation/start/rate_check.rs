@@ -5,6 +5,7 @@ use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::TURNED;
 use crate::simulation::rows::constraints::Constraints;
 use crate::state::Motion;
 
@@ -54,11 +55,9 @@ impl<T: Real> RateCheck<T> {
             // The force of a spring does not depend on rates.
             *silent = constraints.law(row).reads_rates();
         }
-        let mut first = T::zero();
-        let mut found = None;
         for (k, share) in SHARES.into_iter().enumerate() {
             if !silent[..count].contains(&true) {
-                break;
+                return Ok(());
             }
             let t = motion.t + share * h;
             std::mem::swap(before, now);
@@ -66,25 +65,17 @@ impl<T: Real> RateCheck<T> {
             constraints.finite_rates(t, &motion.u, &motion.v, rates)?;
             for row in 0..count {
                 let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &motion.u), now[row]);
-                let moves = k == 0 || (now[row] - before[row]).abs() > T::of(4.0) * rounded;
+                let moves = k == 0 || (now[row] - before[row]).abs() > rounded;
                 silent[row] &= moves && rates[row].rate == T::zero() && constraints.gives_rates(row);
             }
-            found = silent[..count].iter().position(|silent| *silent);
         }
-        if let Some(row) = found {
-            // The gap at the start, again.
-            constraints.finite_gaps(motion.t, &motion.u, before)?;
-            first = before[row];
-        }
-        let last = found.map_or(first, |row| now[row]);
-        match found {
-            None => Ok(()),
-            Some(row) => Err(Error::SilentMotion {
-                contact: constraints.ids[row],
-                t: [motion.t, motion.t + h],
-                gap: [first.value(), last.value()],
-            }),
-        }
+        let Some(row) = silent[..count].iter().position(|silent| *silent) else { return Ok(()) };
+        constraints.finite_gaps(motion.t, &motion.u, before)?;
+        Err(Error::SilentMotion {
+            contact: constraints.ids[row],
+            t: [motion.t, motion.t + h],
+            gap: [before[row].value(), now[row].value()],
+        })
     }
 
     /// Refuses rows that their constraints have reported as unchanged in this step, if the change of the gap between
@@ -95,8 +86,6 @@ impl<T: Real> RateCheck<T> {
         [start, new]: [&Motion<T>; 2],
         jacobian: &ContactJacobian<T>,
     ) -> Result<()> {
-        /// The share of the displacement that a row may miss: hosts may omit turns that do not matter.
-        const SHARE: f64 = 0.01;
         let count = constraints.len();
         if !(0..count).any(|row| constraints.is_unchanged(row, self.version)) {
             return Ok(());
@@ -113,7 +102,7 @@ impl<T: Real> RateCheck<T> {
             }
             let change = now[row] - before[row];
             let rounded = constraints.gap_rounding(row, jacobian.magnitude(row, &new.u) + size, now[row]);
-            if (change - by_row).abs() > T::of(SHARE) * way.max(change.abs()) + T::of(4.0) * rounded {
+            if (change - by_row).abs() > T::of(TURNED) * way.max(change.abs()) + rounded {
                 return Err(Error::SilentTurn {
                     contact: constraints.ids[row],
                     t: [start.t, new.t],

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::SAME_TIME;
 use crate::simulation::build::scheme::Scheme;
 #[cfg(feature = "serde")]
 use crate::simulation::step::resample::computed_capacity;
@@ -49,6 +50,7 @@ impl<T: Real> Resumed<T> {
         [dofs, massless]: [usize; 2],
     ) -> Result<(State<T>, History<T>)> {
         let (state, history) = (self.state, self.history);
+        check_scheme(&history, scheme)?;
         #[cfg(feature = "serde")]
         let history = match self.rows {
             Some(rows) => fitted(&state, history, scheme, rows)?,
@@ -58,9 +60,8 @@ impl<T: Real> Resumed<T> {
         check_vector("the resumed displacement", &state.motion.u, dofs)?;
         check_vector("the resumed velocity", &state.motion.v, dofs)?;
         check_vector("the resumed acceleration", &state.motion.a, dofs)?;
-        check_scheme(&history, scheme)?;
         let (t, end) = (state.motion.t, history.clock.at(0.0));
-        if (t - end).abs() > 1e-6 * history.clock.h {
+        if (t - end).abs() > SAME_TIME * history.clock.h {
             let part = format!("a state of t = {t:e} with a history that ends at t = {end:e}");
             return Err(Error::Incompatible { part, reason: "both belong to one instant: clone them together" });
         }
@@ -85,7 +86,6 @@ fn check_scheme<T: Real>(history: &History<T>, scheme: &Scheme<'_>) -> Result<()
 /// The history of a checkpoint with the spare slots that a run of the scheme has.
 #[cfg(feature = "serde")]
 fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_>, rows: u32) -> Result<History<T>> {
-    check_scheme(&history, scheme)?;
     let refuse = |reason| Err(Error::Incompatible { part: format!("a checkpoint of {}", history.scheme), reason });
     if scheme.tableau.fingerprint() != rows {
         return refuse("the rows of its scheme were others, though their name was that of the scheme of this run");

@@ -5,13 +5,13 @@ use crate::corrector::Corrector;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::run::{Parts, Simulation};
-use crate::simulation::start::massless::Balanced;
-use crate::simulation::start::{self, Begun, Start, Violation};
+use crate::simulation::start::{self, Begun, Origin, Start};
+use crate::state::Motion;
 
 impl<T: Real> Simulation<'_, T> {
     /// Starts again from the displacements and velocities of the present state, after a discontinuity known to the
-    /// host (a load or a support that jumps): accelerations are computed from the balance after it, contacts at rest
-    /// are found again, and the past is computed as at the start.
+    /// host (a load or a support that jumps): dofs without mass are brought into static balance, accelerations are
+    /// computed from the balance after it, contacts at rest are found again, and the past is computed as at the start.
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
@@ -47,16 +47,22 @@ impl<T: Real> Simulation<'_, T> {
         let start = Start {
             system: &mut **system,
             contact_solver: &mut **contact_solver,
+            constraints,
+            g,
+            projection: &mut projection,
             scheme,
             together,
             h,
-            t,
             massless: &work.massless,
-            balanced: Balanced::Massless,
+            origin: Origin::Restart,
             is_smooth: correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion),
         };
-        let Begun { state: mut begun, history: mut past, .. } =
-            start.begin(u, v, constraints, g, &mut projection, Violation::Accepted)?;
+        let started = start.begin(Motion { t, a: vec![T::zero(); u.len()], u, v });
+        if started.is_err() {
+            // The rows belong to the state again.
+            constraints.search(&state.motion, scheme.ahead() * h, g).ok();
+        }
+        let Begun { state: mut begun, history: mut past, .. } = started?;
         work.contact.rows.problem.reserved = constraints.room().min(FORESEEN);
         contact_solver.reserve(work.contact.rows.problem.reserved);
         let is_known = past.known == scheme.depth;
