@@ -17,6 +17,19 @@ pub(crate) fn share_of_rounding<T: Real>() -> T {
     T::of(T::epsilon().value().powf(2.0 / 3.0))
 }
 
+/// √ε, half of the digits: a solved value may miss its bound by this share of itself.
+pub(crate) fn root_of_rounding<T: Real>() -> T {
+    T::epsilon().sqrt()
+}
+
+/// A share of the coefficients of a scheme below which only rounding remains after subtractions.
+pub(crate) const ONLY_ROUNDING: f64 = 1e-12;
+
+// Correctors.
+
+/// How many roundings of a gap the sums of a step may add to it. A number.
+pub(crate) const ROUNDINGS_OF_STEP: f64 = 32.0;
+
 // Contact.
 
 /// The gap below which a contact touches: 1e-10 of the displacement in the step, plus its rounding. A length.

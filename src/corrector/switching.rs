@@ -191,7 +191,7 @@ impl<T: Real> Switching<T> {
     }
 
     /// Checks a row on dofs without mass after the contact problem of a stage: stores it if it has closed or opened.
-    pub(crate) fn note(&mut self, row: usize, contacts: &ContactState<T>) {
+    pub(crate) fn record(&mut self, row: usize, contacts: &ContactState<T>) {
         let Some([gaps, forces]) = &self.start else { return };
         let (gap, force) = match (forces[row] > T::zero(), contacts.lambda_raw[row] > T::zero()) {
             (false, true) => (gaps[row], contacts.lambda_raw[row]),

@@ -19,7 +19,7 @@ pub(super) mod resumed;
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Block, Gaps, JumpProjection, Rubbing};
+use crate::corrector::{Block, Gaps, JumpProblem, JumpProjection};
 use crate::error::{Error, Result};
 use crate::linear_solver::LinearSolver;
 use crate::mass::InverseMass;
@@ -448,7 +448,7 @@ fn rub_known<T: Real>(
     constraints.finite_slip_rates(motion.t, &motion.u, &motion.v, &mut slips)?;
     let mut sliding = sliding(constraints, (g, &slips), motion);
     sliding.retain(|slide| rows.binary_search(&slide.contact).is_ok());
-    let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+    let (tangents, mut problem) = (constraints.tangents(), JumpProblem::default());
     let own = |k: usize| slips[k - tangents.all().start].acceleration;
     let (rows, forces) = loop {
         problem.clear();
@@ -456,12 +456,12 @@ fn rub_known<T: Real>(
             let slide = sliding.iter().find(|slide| slide.contact == row);
             let direction = slide.and_then(|slide| slide.friction(tangents));
             let block = Block::new(row, tangents.of(row).len(), constraints.set(row));
-            problem.push(&Block { direction, known: Some(contacts.lambda[row]), ..block });
-            problem.demand(row, T::zero(), T::zero(), T::zero());
+            problem.add_block(&Block { direction, known: Some(contacts.lambda[row]), ..block });
+            problem.add_row(row, T::zero(), T::zero(), T::zero());
             for (at, k) in tangents.of(row).enumerate() {
                 let over = slide.map_or(T::zero(), |slide| slide.to_stop(h)[at]);
                 let size = g.magnitude(k, &motion.a) + own(k).abs() + over.abs();
-                problem.demand(k, g.product(k, &motion.a) + own(k) + over, rounding(size), T::zero());
+                problem.add_row(k, g.product(k, &motion.a) + own(k) + over, rounding(size), T::zero());
             }
         }
         solver.reserve(problem.rows.len());

@@ -13,7 +13,9 @@ pub(super) mod resample;
 
 use crate::contact::ContactJacobian;
 use crate::contact_solver::ContactSolver;
-use crate::corrector::{Correction, Corrector, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
+use crate::corrector::{
+    Before, Bodies, Correction, Corrector, Erased, ErasedGaps, JumpProjection, Past, Prediction, Scheme,
+};
 use crate::error::Result;
 use crate::mass::Mass;
 use crate::real::Real;
@@ -194,7 +196,7 @@ impl<T: Real> Simulation<'_, T> {
             g,
             forces,
             load,
-            closed: &work.correction.buffers.closed,
+            closed: &work.correction.buffers.rows.closed,
             closed_at_start,
             is_corrected: correctors.iter().any(|corrector| !corrector.effects().corrects_massless),
             corrections,
@@ -311,25 +313,26 @@ impl<T: Real> Simulation<'_, T> {
                 {
                     refresh(projection, &mut work.correction.projected_rows, constraints.version());
                     let mut correction = Correction {
-                        h: clock.h,
-                        t: new.t,
-                        scheme: numbers(stage, covector, [stages_before, program.stages.len()]),
+                        scheme: numbers(stage, clock.h, covector, [stages_before, program.stages.len()]),
                         g,
                         projection,
-                        operator,
-                        block: work.block.as_mut(),
+                        bodies: Bodies {
+                            system: Erased(&mut **system),
+                            operator,
+                            block: work.block.as_mut(),
+                            massless: &work.massless,
+                            prescribed: &work.vectors.supports.dofs,
+                        },
                         solver: &mut **contact_solver,
-                        system: Erased(&mut **system),
                         constraints: ErasedGaps(constraints),
                         new,
-                        past,
-                        backup: &mut work.backup,
+                        past: Past { states: past, backup: &mut work.backup },
                         contacts: &mut work.contact.trial,
-                        was_closed: &work.contact.was_closed,
-                        closed_at_start: &work.contact.closed_at_start,
-                        was_sticking: &work.contact.was_sticking,
-                        massless: &work.massless,
-                        prescribed: &work.vectors.supports.dofs,
+                        before: Before {
+                            closed: &work.contact.was_closed,
+                            closed_at_start: &work.contact.closed_at_start,
+                            sticking: &work.contact.was_sticking,
+                        },
                         buffers: &mut work.correction.buffers,
                         energy: &mut work.correction.energy,
                     };
@@ -357,30 +360,26 @@ fn begin_corrections<T: Real>(
     (stage, clock, is_first): (&CompiledStage<T>, Clock, bool),
     (new, past): (&mut Motion<T>, &[Motion<T>]),
 ) -> Result<()> {
-    let CorrectionWork { buffers, projection, projected_rows, shifted, .. } = &mut work.correction;
+    let CorrectionWork { buffers, projection, projected_rows, .. } = &mut work.correction;
     let (Some(projection), Some(start)) = (projection, past.first()) else { return Ok(()) };
     refresh(projection, projected_rows, constraints.version());
     buffers.begin(&work.contact.trial, is_first);
-    if shifted.is_empty() {
+    if buffers.shifted.is_empty() {
         return Ok(());
     }
     let mut prediction = Prediction {
         h: clock.h * stage.end,
-        t: new.t,
-        balance_share: balance_share(stage),
         g,
         projection,
         solver,
         constraints: ErasedGaps(constraints),
         start,
         new,
-        balance: work.vectors.balance.as_mut().filter(|_| stage.balance.is_some()),
-        was_closed: &work.contact.trial.closed,
+        balance: work.vectors.balance.as_mut().filter(|_| stage.balance.is_some()).map(|at| (balance_share(stage), at)),
+        contacts: &work.contact.trial,
         massless: &work.massless,
         prescribed: &work.vectors.supports.dofs,
-        ids: &work.contact.trial.ids,
         buffers,
-        shifted,
     };
     correctors.iter().try_for_each(|corrector| corrector.predict(&mut prediction))
 }
@@ -402,10 +401,12 @@ fn balance_share<T: Real>(stage: &CompiledStage<T>) -> T {
 /// The numbers of a stage that a correction needs; the stage is number `place` of `stages`.
 fn numbers<'s, T: Real>(
     stage: &'s CompiledStage<T>,
+    h: f64,
     covector: &'s [[f64; 3]],
     [place, stages]: [usize; 2],
 ) -> Scheme<'s> {
     Scheme {
+        h,
         response: stage.response,
         acceleration: stage.acceleration,
         balance: stage.balance_acceleration,

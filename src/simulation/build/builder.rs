@@ -6,7 +6,7 @@ use crate::analysis;
 use crate::contact::ContactLaw;
 use crate::contact::{ContactConstraint, ContactJacobian};
 use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
-use crate::corrector::Corrector;
+use crate::corrector::{Corrector, Effects};
 use crate::error::{Error, Result, step_size};
 use crate::integrator::TimeIntegrator;
 use crate::linear_solver::{Automatic, LinearSolver};
@@ -430,7 +430,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             check_corrections(&*scheme.integrator, &scheme.tableau, &mut *system, &self.correctors)?;
         }
         let mut projection = start::projection(&*system, &constraints, (together, &*self.linear_solver))?;
-        let is_smooth = self.correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        let is_smooth = Effects::of_all(&self.correctors).leaves_smooth_motion;
         let is_resumed = resumed.is_some();
         let begun = if let Some((state, history)) = resumed {
             take_up(&mut constraints, &mut g, (&scheme, system.prescribed()), (&state, &history))?;

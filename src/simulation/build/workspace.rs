@@ -2,7 +2,7 @@
 //! before.
 
 use crate::contact::ContactJacobian;
-use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::corrector::{Backup, Buffers, Corrector, Edits, Effects, JumpProjection};
 use crate::error::Result;
 use crate::ranks::Together;
 use crate::real::Real;
@@ -52,8 +52,6 @@ pub(crate) struct CorrectionWork<T: Real> {
     pub(crate) projection: Option<JumpProjection<T>>,
     /// Version of the rows for which the projection was made.
     pub(crate) projected_rows: u64,
-    /// For correctors that act on the prediction, one entry a dof.
-    pub(crate) shifted: Vec<T>,
     /// Change of kinetic energy by corrections in this step.
     pub(crate) energy: T,
 }
@@ -91,8 +89,8 @@ impl<T: Real> Workspace<T> {
         let dofs = system.dofs();
         let &ContactSize { rows, entries, interface, may_press, curved } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
-        let balances = may_press && correctors.iter().any(|corrector| corrector.effects().corrects_massless);
-        let edits_past = correctors.iter().any(|corrector| corrector.effects().edits == Edits::Past);
+        let effects = Effects::of_all(correctors);
+        let balances = may_press && effects.corrects_massless;
         let room = |needed: bool| if needed && may_press { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
@@ -102,7 +100,7 @@ impl<T: Real> Workspace<T> {
         if curved && may_press {
             contact_rows.curved.mixing = Some(Box::new(Mixing::new(interface)));
         }
-        contact_rows.slides_by_way = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        contact_rows.slides_by_way = effects.leaves_smooth_motion;
         Self {
             contact: ContactWork {
                 interface: InterfaceWork::new(interface),
@@ -126,17 +124,16 @@ impl<T: Real> Workspace<T> {
             block: None,
             excess: None,
             correction: CorrectionWork {
-                buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
+                buffers: Buffers::new(rows, [damped, room(effects.predicts)], balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
                 projected_rows: 0,
-                shifted: vec![T::zero(); room(correctors.iter().any(|corrector| corrector.effects().predicts))],
                 energy: T::zero(),
             },
             rate_check: RateCheck::new(rows),
             stiffening: None,
             rows,
             shown: [Vec::new(), Vec::new()],
-            backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
+            backup: Backup::new(if effects.edits == Edits::Past { slots - 1 } else { 0 }, dofs),
         }
     }
 
@@ -153,7 +150,7 @@ impl<T: Real> Workspace<T> {
         if let Some(name) = follower {
             self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
             self.contact.rows.on_massless = vec![false; self.rows];
-        } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
+        } else if self.correction.buffers.switching.is_on() && self.correction.buffers.shifted.is_empty() {
             self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
         }
         let buffers = &mut self.correction.buffers;
@@ -164,7 +161,7 @@ impl<T: Real> Workspace<T> {
                 Linearity::Nonlinear => Ok(!massless.is_empty()),
             };
             let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
-            buffers.damps_massless = damps > 0.0;
+            buffers.damping.on_massless = damps > 0.0;
         }
         self.contact.rows.massless.clone_from(&massless);
         self.massless = massless;

@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactId, ContactJacobian, ContactLaw, Course, GapRates, Tangents};
 use crate::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver};
-use crate::corrector::{Block, Gaps, JumpProjection, Rubbing, contact_error, slides};
+use crate::corrector::{Block, Gaps, JumpProblem, JumpProjection, contact_error, slides};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::rounding;
@@ -253,19 +253,19 @@ impl<T: Real> StartProblem<T> {
         rates.truncate(constraints.len());
         rates.append(&mut slips);
         let rate = |v: &[T], row: usize| g.product(row, v) + rates[row].rate;
-        let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+        let (tangents, mut problem) = (constraints.tangents(), JumpProblem::default());
         for &row in self.rows.iter().filter(|&&row| self.compliance[row] == T::zero()) {
             let own = if rubs(row) { tangents.of(row) } else { 0..0 };
             let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
             if row != contact {
-                problem.push(&Block::new(row, own.len(), set));
+                problem.add_block(&Block::new(row, own.len(), set));
             }
             for row in std::iter::once(row).chain(own) {
                 if tangents.owner(row) == contact {
-                    problem.push(&Block::new(row, 0, AdmissibleSet::Free));
+                    problem.add_block(&Block::new(row, 0, AdmissibleSet::Free));
                 }
                 let noise = rounding(g.magnitude(row, &motion.v) + rates[row].rate.abs());
-                problem.demand(row, rate(&motion.v, row), noise, T::zero());
+                problem.add_row(row, rate(&motion.v, row), noise, T::zero());
             }
         }
         solver.reserve(problem.rows.len());
@@ -390,18 +390,18 @@ impl<T: Real> StartProblem<T> {
         solver: &mut dyn ContactSolver<T>,
     ) -> Result<()> {
         let Self { rows, offset, tolerance, compliance, sliding, h, solved, lambda, .. } = self;
-        let (tangents, mut problem) = (constraints.tangents(), Rubbing::default());
+        let (tangents, mut problem) = (constraints.tangents(), JumpProblem::default());
         for &row in rows.iter() {
             let own = if rubs(row) { tangents.of(row) } else { 0..0 };
             let slide = sliding.iter().find(|slide| slide.contact == row && !own.is_empty());
             let direction = slide.and_then(|slide| slide.friction(tangents));
             let set = if own.is_empty() { constraints.law(row).into() } else { constraints.set(row) };
             let block = Block::new(row, own.len(), set);
-            problem.push(&Block { direction, compliance: compliance[row], ..block });
-            problem.demand(row, offset[row], tolerance[row], T::zero());
+            problem.add_block(&Block { direction, compliance: compliance[row], ..block });
+            problem.add_row(row, offset[row], tolerance[row], T::zero());
             for (k, row) in own.enumerate() {
                 let over = slide.zip(*h).map_or(T::zero(), |(slide, h)| slide.to_stop(h)[k]);
-                problem.demand(row, offset[row] + over, tolerance[row] + rounding(over.abs()), T::zero());
+                problem.add_row(row, offset[row] + over, tolerance[row] + rounding(over.abs()), T::zero());
             }
         }
         solver.reserve(problem.rows.len());

@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactJacobian, GapRates};
 use crate::contact_solver::FORESEEN;
-use crate::corrector::{Corrector, Gaps, JumpProjection, no_response};
+use crate::corrector::{Effects, Gaps, JumpProjection, no_response};
 use crate::error::{Result, step_size};
 use crate::ranks::check_alike;
 use crate::real::Real;
@@ -258,7 +258,7 @@ impl<T: Real> Simulation<'_, T> {
         let (h, t) = (self.history.clock.h, self.time());
         let Self { system, constraints, g, contact_solver, correctors, scheme, startup, state, .. } = self;
         let (history, work) = (&mut self.history, &mut self.work);
-        let is_smooth = correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        let is_smooth = Effects::of_all(correctors).leaves_smooth_motion;
         let massless = &work.massless[..];
         let (u, v) = (state.displacement().to_vec(), state.velocity().to_vec());
         let mut projection = start::projection(&**system, constraints, (&self.together, &*self.linear_solver))?;
