@@ -264,10 +264,6 @@ impl<T: Real> Simulation<'_, T> {
             let is_first = stages_before == 0;
             let (rows, motions, at) = ((&mut *constraints, &*g), (&mut *new, &*past), (stage, clock, is_first));
             begin_corrections(work, correctors, &mut **contact_solver, rows, at, motions)?;
-            if let Some(excess) = &mut work.excess {
-                excess.begin(is_first);
-                excess.shift(stage, clock.h, new);
-            }
             work.contact.rows.read_start(constraints, g, past, clock.h)?;
             let (parts, solver) = (&mut **system, &mut **contact_solver);
             let mut solve =
@@ -276,11 +272,6 @@ impl<T: Real> Simulation<'_, T> {
             match (&mut work.newton, &mut work.block) {
                 (Some(newton), None) => solve.by_iteration(newton, new, past, vectors, contact)?,
                 (_, block) => solve.directly(block.as_mut(), new, past, vectors, contact)?,
-            }
-            if let (Some(excess), Some(projection)) = (&mut work.excess, &mut work.correction.projection) {
-                let switching = &mut *work.correction.buffers.switching;
-                work.correction.energy +=
-                    excess.solve_again(&mut solve, (new, past), (vectors, contact), (switching, projection))?;
             }
             for (&dof, support) in work.vectors.supports.dofs.iter().zip(&work.vectors.supports.state) {
                 new.a[dof] = support[2];
@@ -305,9 +296,6 @@ impl<T: Real> Simulation<'_, T> {
                     &mut work.correction.buffers,
                     &mut work.contact,
                 )?;
-                if let Some(excess) = &work.excess {
-                    excess.book(stage, clock.h, &work.correction.buffers.switching, &mut work.contact.trial);
-                }
                 if let Some(projection) =
                     work.correction.projection.as_mut().filter(|_| work.correction.buffers.has_touched())
                 {

@@ -467,7 +467,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let size = ContactSize::new(rows, &g, &constraints);
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
         let follower = follows.then(|| scheme.integrator.name());
-        work.keep_massless(massless, (&mut *system, together), (&program, follower), &state.motion, interface)?;
+        work.keep_massless(massless, (&mut *system, together), follower, &state.motion, interface)?;
         work.newton = newton(self.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.shown = scheme.shown(&state.motion);
         let checked = self.stability == Stability::Checked && together.is_alone();
