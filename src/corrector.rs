@@ -3,14 +3,13 @@
 mod buffers;
 mod contact_implicit;
 mod correction;
-mod group_problem;
+mod jump_problem;
 mod jump_projection;
 mod laursen_love;
 mod nonsmooth_splitting;
 mod persistency;
 mod prediction;
 mod release;
-mod rubbing_problem;
 mod switching;
 mod work_balance;
 mod zero_acceleration;
@@ -21,15 +20,14 @@ pub(crate) use crate::state::Backup;
 pub(crate) use buffers::Buffers;
 pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
-pub(crate) use correction::{Erased, Scheme};
+pub(crate) use correction::{Before, Bodies, Erased, Past, Scheme};
+pub(crate) use jump_problem::{Block, JumpProblem, slides};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
 pub use nonsmooth_splitting::NonsmoothSplitting;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
-pub(crate) use rubbing_problem::{Block, Rubbing, slides};
-pub(crate) use switching::Switching;
 pub use work_balance::WorkBalance;
 pub use zero_acceleration::ZeroAcceleration;
 
@@ -128,10 +126,10 @@ impl Default for Requirements {
         Self {
             scheme: Ok(()),
             damping: Ok(()),
-            friction: Err("the correction knows nothing of friction: choose `PersistencyCorrection`, or none"),
+            friction: Err("the corrector does not support friction: choose `PersistencyCorrection`, or none"),
             persistency_switch: Ok(()),
             restitution: Err(
-                "the correction knows nothing of restitution: choose `PersistencyCorrection::with_history_projection`",
+                "the corrector does not support restitution: choose `PersistencyCorrection::with_history_projection`",
             ),
         }
     }
@@ -154,6 +152,18 @@ pub struct Effects {
     pub corrects_massless: bool,
     /// [`predict`](Corrector::predict) does something; its memory is reserved only then.
     pub predicts: bool,
+}
+
+impl Effects {
+    /// The effects of several correctors together.
+    pub(crate) fn of_all<T: Real>(correctors: &[Box<dyn Corrector<T> + '_>]) -> Self {
+        correctors.iter().map(|corrector| corrector.effects()).fold(Self::default(), |all, own| Self {
+            edits: all.edits.max(own.edits),
+            leaves_smooth_motion: all.leaves_smooth_motion || own.leaves_smooth_motion,
+            corrects_massless: all.corrects_massless || own.corrects_massless,
+            predicts: all.predicts || own.predicts,
+        })
+    }
 }
 
 /// Which states a corrector changes.

@@ -80,6 +80,11 @@ pub(crate) fn smallest_gap<T: Float>() -> T {
     T::min_positive_value() / T::epsilon()
 }
 
+// Correctors.
+
+/// How many roundings of a gap the sums of a step may add to it. A number.
+pub(crate) const ROUNDINGS_OF_STEP: f64 = 32.0;
+
 // Contact.
 
 /// The gap below which a contact touches: 1e-10 of the displacement in the step, plus its rounding. A length.

@@ -117,10 +117,7 @@ pub(crate) fn reduced(dam: &Dam, loading: &Loading, plan: &Plan, way: Way) -> Re
     let Way { boundary, softening, modes, scheme } = way;
     let has_mass = boundary == Boundary::CraigBampton;
     let softened = softening.map_or(String::new(), |softening| format!(", softening {softening}"));
-    let mut name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
-    if !has_mass && scheme == Scheme::Trapezoidal {
-        name += ", trapezoidal rule";
-    }
+    let name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
     let mut record = Record::of(&name, dam, plan.steps, || {
         let (mut blocks, mut firsts, mut loads) = (Blocks::new(), Vec::new(), [const { Vec::new() }; 4]);
         for block in &dam.blocks {

@@ -3,6 +3,7 @@
 use super::{Correction, Corrector, Effects, Extent, Prediction, Requirements, Verdict};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::ONLY_ROUNDING;
 use crate::tableau::{Rows, Tableau};
 
 /// The contact-implicit form of a one-step scheme (Kane, Repetto, Ortiz, Marsden, Comput. Methods Appl. Mech. Eng.
@@ -124,7 +125,7 @@ pub(super) fn one_step(tableau: &Tableau) -> Verdict {
 /// Rejects schemes in which removing a constant contact force from the acceleration requires a change of v.
 pub(super) fn adds_no_velocity(tableau: &Tableau) -> Verdict {
     let moves = |row: fn(&Rows) -> f64| tableau.stages.iter().map(|stage| row(&stage.recovery)).sum::<f64>();
-    match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < 1e-12 {
+    match (2.0 * moves(|rows| rows.u.z) - moves(|rows| rows.v.z)).abs() < ONLY_ROUNDING {
         true => Ok(()),
         false => Err("damping would act on the impulse that it adds to v only in the next step; choose a scheme with \
                       γ = 2β, as the trapezoidal rule"),
@@ -135,20 +136,18 @@ pub(super) fn adds_no_velocity(tableau: &Tableau) -> Verdict {
 /// a − r_a M⁻¹ Gᵀ λ, v ← v + h (2 r_u − r_v) M⁻¹ Gᵀ λ, reported force 2 r_u λ, with r the response of the scheme's
 /// (u, h v, h² a) to a multiplier.
 fn act_implicitly<T: Real>(step: &mut Correction<'_, T>) -> Result<()> {
-    let rows = std::mem::take(&mut step.buffers.closed);
-    let mut impulses = std::mem::take(&mut step.buffers.impulses);
-    let [u, v, a] = step.response();
+    let rows = std::mem::take(&mut step.buffers.rows.closed);
+    let mut impulses = std::mem::take(&mut step.buffers.impulses.multipliers);
+    let [u, v, _] = step.response();
+    let mut result = step.remove_raw_forces(&rows);
     impulses.clear();
-    impulses.extend(rows.iter().map(|&row| step.contacts.lambda_raw[row]));
-    let mut result = step.projection.push(step.g, (&rows, &impulses), -T::of(a), &mut step.new.a);
-    for (&row, impulse) in rows.iter().zip(&mut impulses) {
-        let lambda = *impulse;
-        step.book_impulse(row, -(T::of(step.momentum_weights()[2] * a) * lambda));
+    for &row in &rows {
+        let lambda = step.contacts.lambda_raw[row];
         step.report_force(row, T::of(2.0 * u) * lambda);
-        *impulse = T::of(step.h * (2.0 * u - v)) * lambda;
+        impulses.push(T::of(step.scheme.h * (2.0 * u - v)) * lambda);
     }
     result = result.and_then(|()| step.apply_impulses(&rows, &impulses));
-    step.buffers.closed = rows;
-    step.buffers.impulses = impulses;
+    step.buffers.rows.closed = rows;
+    step.buffers.impulses.multipliers = impulses;
     result
 }

@@ -49,13 +49,7 @@ use crate::sparse;
 pub struct JumpProjection<T: Real> {
     inverse: InverseMass<T>,
     dofs: usize,
-    /// For each row the slot of its column of M⁻¹ Gᵀ, computed when the row is first closed; consistent masses only.
-    slots: Vec<usize>,
-    columns: Vec<Column<T>>,
-    /// Number of columns computed for the present G.
-    computed: usize,
-    /// Rows whose columns are being computed.
-    missing: Vec<usize>,
+    columns: Columns<T>,
     closed: Vec<usize>,
     /// The closed rows, grouped by shared dofs. S couples no two groups.
     groups: Groups,
@@ -68,6 +62,18 @@ pub struct JumpProjection<T: Real> {
     spread: SpreadRow<T>,
     /// Whether roots and factors belong to `closed`.
     factored: bool,
+}
+
+/// Columns of M⁻¹ Gᵀ, computed when their rows are first closed; consistent masses only.
+#[derive(Debug)]
+struct Columns<T> {
+    /// For each row the slot of its column.
+    slots: Vec<usize>,
+    stored: Vec<Column<T>>,
+    /// Number of columns computed for the present G.
+    computed: usize,
+    /// Rows whose columns are being computed.
+    missing: Vec<usize>,
 }
 
 /// A column of M⁻¹ Gᵀ in the order of the places of M⁻¹.
@@ -132,10 +138,14 @@ impl<T: Real> JumpProjection<T> {
         Ok(Self {
             inverse,
             dofs,
-            slots: vec![NONE; stored],
-            columns: (0..foreseen).map(|_| Column { values: Vec::with_capacity(dofs), extent: Extent::Near }).collect(),
-            computed: 0,
-            missing: Vec::with_capacity(stored),
+            columns: Columns {
+                slots: vec![NONE; stored],
+                stored: (0..foreseen)
+                    .map(|_| Column { values: Vec::with_capacity(dofs), extent: Extent::Near })
+                    .collect(),
+                computed: 0,
+                missing: Vec::with_capacity(stored),
+            },
             closed: Vec::with_capacity(rows),
             groups: Groups::with_capacity(rows, keys),
             roots: Vec::with_capacity(rows),
@@ -148,8 +158,8 @@ impl<T: Real> JumpProjection<T> {
 
     /// Discards everything computed from an earlier G.
     pub fn reset(&mut self) {
-        self.slots.fill(NONE);
-        self.computed = 0;
+        self.columns.slots.fill(NONE);
+        self.columns.computed = 0;
         self.factored = false;
     }
 
@@ -173,7 +183,7 @@ impl<T: Real> JumpProjection<T> {
         // A consistent mass stores columns of M⁻¹Gᵀ, one for each announced row.
         let stored = match self.inverse {
             InverseMass::Lumped(_) => usize::MAX,
-            InverseMass::Consistent(_) => self.slots.len(),
+            InverseMass::Consistent(_) => self.columns.slots.len(),
         };
         for &row in rows {
             if row >= g.rows() {
@@ -346,10 +356,10 @@ impl<T: Real> JumpProjection<T> {
         if is_few {
             self.make_columns(g, rows, Extent::All)?;
         }
-        let Self { inverse, columns, slots, .. } = self;
+        let Self { inverse, columns, .. } = self;
         let InverseMass::Consistent(inverse) = inverse else { return Ok(()) };
         if is_few {
-            inverse.combine(pushes.map(|(row, c)| (c, &columns[slots[row]].values[..])), x);
+            inverse.combine(pushes.map(|(row, c)| (c, &columns.of(row).values[..])), x);
             return Ok(());
         }
         let forces = pushes.flat_map(|(row, c)| g.row(row).map(move |(dof, weight)| (dof, c * weight)));
@@ -384,8 +394,8 @@ impl<T: Real> JumpProjection<T> {
     /// Computes the columns of these rows that are missing or too short. The values of a column do not depend on when
     /// it is computed.
     fn make_columns(&mut self, g: &ContactJacobian<T>, rows: &[usize], extent: Extent) -> Result<()> {
-        let Self { inverse, slots, columns, computed, missing, .. } = self;
-        let InverseMass::Consistent(inverse) = inverse else { return Ok(()) };
+        let InverseMass::Consistent(inverse) = &mut self.inverse else { return Ok(()) };
+        let Columns { slots, stored: columns, computed, missing } = &mut self.columns;
         let count = rows.iter().max().map_or(0, |last| last + 1);
         slots.resize(count.max(slots.len()), NONE);
         let find = |missing: &mut Vec<usize>, columns: &[Column<T>]| {
@@ -438,7 +448,7 @@ impl<T: Real> JumpProjection<T> {
                 },
             ),
             InverseMass::Consistent(inverse) => {
-                pairs.for_each(|(entry, j)| *entry = self.columns[self.slots[j]].product(inverse, g.row(i)));
+                pairs.for_each(|(entry, j)| *entry = self.columns.of(j).product(inverse, g.row(i)));
             }
         }
     }
@@ -446,6 +456,13 @@ impl<T: Real> JumpProjection<T> {
     /// Number of dofs over which responses of a lumped mass are spread.
     fn dofs_of_lumped(&self) -> usize {
         if matches!(self.inverse, InverseMass::Lumped(_)) { self.dofs } else { 0 }
+    }
+}
+
+impl<T> Columns<T> {
+    /// The column of a row.
+    fn of(&self, row: usize) -> &Column<T> {
+        &self.stored[self.slots[row]]
     }
 }
 

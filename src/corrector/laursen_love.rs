@@ -4,6 +4,7 @@ use super::contact_implicit::one_step;
 use super::{Correction, Corrector, Requirements};
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::ONLY_ROUNDING;
 use crate::tableau::Tableau;
 
 /// The velocity jump of Laursen and Love (Int. J. Numer. Methods Eng. 53, 2002): after a step the velocities along
@@ -38,7 +39,7 @@ impl<T: Real> Corrector<T> for LaursenLove {
     }
 
     fn requirements(&self, tableau: &Tableau) -> Requirements {
-        let is_midpoint = tableau.stages.iter().all(|stage| (stage.load - 0.5).abs() < 1e-12);
+        let is_midpoint = tableau.stages.iter().all(|stage| (stage.load - 0.5).abs() < ONLY_ROUNDING);
         let midpoint = if is_midpoint {
             Ok(())
         } else {
@@ -64,7 +65,7 @@ fn contact_work<T: Real>(step: &mut Correction<'_, T>) -> Result<T> {
         return Ok(T::zero());
     }
     let Correction { buffers, contacts, .. } = step;
-    let (closed, gaps) = (&buffers.closed, &buffers.gaps);
+    let (closed, gaps) = (&buffers.rows.closed, &buffers.readings.gaps);
     Ok(closed.iter().map(|&row| contacts.lambda_raw[row] * (contacts.gap[row] - gaps[row])).sum())
 }
 
@@ -72,28 +73,15 @@ fn contact_work<T: Real>(step: &mut Correction<'_, T>) -> Result<T> {
 /// proportional to the raw multipliers of the closed rows.
 fn exchange_by_forces<T: Real>(step: &mut Correction<'_, T>, energy: T) -> Result<()> {
     step.read_rates()?;
-    let rows = std::mem::take(&mut step.buffers.closed);
-    let mut impulses = std::mem::take(&mut step.buffers.impulses);
+    let rows = std::mem::take(&mut step.buffers.rows.closed);
+    let mut impulses = std::mem::take(&mut step.buffers.impulses.multipliers);
     impulses.clear();
     impulses.extend(rows.iter().map(|&row| step.contacts.lambda_raw[row].max(T::zero())));
-    let mut result = step.projection.assemble(step.g, &rows, &mut step.buffers.s);
-    let size = rows.len();
-    let (mut square, mut rate) = (T::zero(), T::zero());
-    let answered = if result.is_ok() { &rows[..] } else { &[] };
-    for (i, (&row, &x)) in answered.iter().zip(&impulses).enumerate() {
-        rate += x * (step.g.product(row, &step.new.v) + step.buffers.rates[row].rate);
-        let column = &step.buffers.s[i * size..(i + 1) * size];
-        square += x * column.iter().zip(&impulses).map(|(&s, &y)| s * y).sum::<T>();
+    let mut result = step.scale_to_energy(&rows, &mut impulses, energy);
+    if let Ok(true) = result {
+        result = step.apply(&rows, &impulses).map(|()| true);
     }
-    if square > T::zero() {
-        let root = (rate * rate + T::of(2.0) * square * energy).max(T::zero()).sqrt();
-        let factor = (root - rate) / square;
-        for x in &mut impulses {
-            *x *= factor;
-        }
-        result = step.apply(&rows, &impulses);
-    }
-    step.buffers.closed = rows;
-    step.buffers.impulses = impulses;
-    result
+    step.buffers.rows.closed = rows;
+    step.buffers.impulses.multipliers = impulses;
+    result.map(|_| ())
 }

@@ -2,7 +2,7 @@
 
 use super::contact_implicit::{adds_no_velocity, one_step};
 use super::correction::Pressed;
-use super::{Correction, Corrector, Effects, Requirements, Rubbing};
+use super::{Correction, Corrector, Effects, Requirements};
 use crate::error::Result;
 use crate::real::Real;
 use crate::tableau::Tableau;
@@ -79,8 +79,8 @@ impl<T: Real> Corrector<T> for NonsmoothSplitting {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.solve_rubbing_velocity(Pressed::MayPart)?;
-        step.push_rubbing_velocity()?;
+        step.solve_velocity(Pressed::MaySeparate)?;
+        step.push_velocity()?;
         step.split_forces()
     }
 }
@@ -89,20 +89,12 @@ impl<T: Real> Correction<'_, T> {
     /// Removes the forces of closed contacts, including friction, from the accelerations, and reports the total
     /// impulses of the velocity problem divided by h.
     fn split_forces(&mut self) -> Result<()> {
-        let (h, [.., by_a]) = (T::of(self.h), self.response());
-        let Rubbing { rows, totals, .. } = &mut *self.buffers.rubbing;
-        let (rows, totals) = (std::mem::take(rows), std::mem::take(totals));
-        let mut raw = std::mem::take(&mut self.buffers.forces);
-        raw.clear();
-        raw.extend(rows.iter().map(|&row| self.contacts.lambda_raw[row]));
-        let result = self.projection.push(self.g, (&rows, &raw), -T::of(by_a), &mut self.new.a);
-        let weight = self.momentum_weights()[2];
-        for ((&row, &total), &raw) in rows.iter().zip(&totals).zip(&raw) {
-            let force = -T::of(by_a) * raw;
-            self.book_impulse(row, T::of(weight) * force);
-            self.report_force(row, total / h);
+        let rows = std::mem::take(&mut self.buffers.impulses.rows);
+        let result = self.remove_raw_forces(&rows);
+        for (&row, &total) in rows.iter().zip(&self.buffers.problem.totals) {
+            self.contacts.lambda[row] = total / T::of(self.scheme.h);
         }
-        (self.buffers.rubbing.rows, self.buffers.rubbing.totals, self.buffers.forces) = (rows, totals, raw);
+        self.buffers.impulses.rows = rows;
         result
     }
 }

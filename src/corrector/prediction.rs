@@ -1,23 +1,20 @@
 //! Data for a corrector before a stage is solved: the predicted displacements and their projection onto the contact
 //! conditions.
 
-use super::group_problem::Jumps;
-use super::{Buffers, JumpProjection};
-use crate::contact::{ContactId, ContactJacobian, ErasedGaps};
+use super::jump_problem::Block;
+use super::{Buffers, JumpProblem, JumpProjection};
+use crate::contact::{ContactJacobian, ErasedGaps};
 use crate::contact_solver::{AdmissibleSet, ContactSolver};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::rounding;
-use crate::state::Motion;
+use crate::state::{ContactState, Motion};
 
 /// One stage before it is solved, passed to [`Corrector::predict`](super::Corrector::predict).
 #[derive(Debug)]
 pub struct Prediction<'a, T: Real> {
     /// Time between the previous state and the state of the stage.
     pub(crate) h: f64,
-    pub(crate) t: f64,
-    /// Weight of the unknown in the displacements of the balance, relative to its weight in the state.
-    pub(crate) balance_share: T,
     pub(crate) g: &'a ContactJacobian<T>,
     pub(crate) projection: &'a mut JumpProjection<T>,
     pub(crate) solver: &'a mut dyn ContactSolver<T>,
@@ -25,14 +22,14 @@ pub struct Prediction<'a, T: Real> {
     /// The previous state.
     pub(crate) start: &'a Motion<T>,
     pub(crate) new: &'a mut Motion<T>,
-    pub(crate) balance: Option<&'a mut Motion<T>>,
-    pub(crate) was_closed: &'a [bool],
+    /// The motion of the balance, and the weight of the unknown in its displacements, relative to its weight in the
+    /// state.
+    pub(crate) balance: Option<(T, &'a mut Motion<T>)>,
+    /// The contacts before the stage.
+    pub(crate) contacts: &'a ContactState<T>,
     pub(crate) massless: &'a [usize],
     pub(crate) prescribed: &'a [usize],
-    pub(crate) ids: &'a [ContactId],
     pub(crate) buffers: &'a mut Buffers<T>,
-    /// u + h v, one entry per dof.
-    pub(crate) shifted: &'a mut [T],
 }
 
 /// Which contacts project a prediction.
@@ -49,7 +46,7 @@ pub enum Extent {
 impl<T: Real> Prediction<'_, T> {
     /// Time of the stage.
     pub fn time(&self) -> f64 {
-        self.t
+        self.new.t
     }
 
     /// Moves u + h v to the nearest admissible point in the mass norm and shifts the displacements at the start of
@@ -61,26 +58,30 @@ impl<T: Real> Prediction<'_, T> {
     /// [`Error::ContactNotFinite`](crate::Error::ContactNotFinite), [`Error::Contact`](crate::Error::Contact),
     /// [`Error::ContradictoryContacts`](crate::Error::ContradictoryContacts).
     pub fn project(&mut self, extent: Extent) -> Result<()> {
-        let count = self.ids.len();
-        let rigid = |constraints: &ErasedGaps<'_, T>, row: usize| constraints.0.law(row).is_plain();
-        let mut rows = std::mem::take(&mut self.buffers.closed);
-        let mut mu = std::mem::take(&mut self.buffers.impulses);
+        let mut rows = std::mem::take(&mut self.buffers.rows.closed);
+        let mut problem = std::mem::take(&mut *self.buffers.problem);
         rows.clear();
-        mu.clear();
-        let mut result;
+        problem.clear();
+        let result = self.project_rows(&mut rows, &mut problem, extent);
+        self.buffers.rows.closed = rows;
+        *self.buffers.problem = problem;
+        result
+    }
+
+    /// Adds violated rows to the problem until there are no others, and moves the displacements by its solution.
+    fn project_rows(&mut self, rows: &mut Vec<usize>, problem: &mut JumpProblem<T>, extent: Extent) -> Result<()> {
         loop {
-            result = self.advance(&rows, &mu).and_then(|()| self.read_gaps());
-            if result.is_err() {
-                break;
-            }
+            self.advance(problem)?;
+            self.read_gaps()?;
             let before = rows.len();
-            for row in 0..count {
-                let takes_part = rigid(&self.constraints, row)
-                    && (extent == Extent::All || self.was_closed[row])
+            for row in 0..self.contacts.ids.len() {
+                let law = self.constraints.0.law(row);
+                let takes_part = law.is_plain()
+                    && (extent == Extent::All || self.contacts.closed[row])
                     && (self.massless.is_empty() || !self.g.acts_on(row, self.massless));
-                let gap = self.buffers.gaps[row];
-                let violated = gap < -rounding(self.g.magnitude(row, self.shifted) + gap.abs());
-                if takes_part && (violated || self.constraints.0.law(row).is_equality()) && !rows.contains(&row) {
+                let gap = self.buffers.readings.gaps[row];
+                let violated = gap < -rounding(self.g.magnitude(row, &self.buffers.shifted) + gap.abs());
+                if takes_part && (violated || law.is_equality()) && !problem.rows.contains(&row) {
                     rows.push(row);
                 }
             }
@@ -88,56 +89,47 @@ impl<T: Real> Prediction<'_, T> {
                 break;
             }
             rows.sort_unstable();
-            result = self.solve(&rows, &mut mu);
-            if result.is_err() {
-                break;
-            }
+            self.solve(rows, problem)?;
         }
-        if result.is_ok() {
-            result = self.projection.push(self.g, (&rows, &mu), T::one(), &mut self.new.u);
-            if let (Ok(()), Some(motion)) = (&result, &mut self.balance) {
-                result = self.projection.push(self.g, (&rows, &mu), self.balance_share, &mut motion.u);
-            }
+        let moves = (&problem.rows[..], &problem.totals[..]);
+        self.projection.push(self.g, moves, T::one(), &mut self.new.u)?;
+        match &mut self.balance {
+            Some((share, motion)) => self.projection.push(self.g, moves, *share, &mut motion.u),
+            None => Ok(()),
         }
-        self.buffers.closed = rows;
-        self.buffers.impulses = mu;
-        result
     }
 
     /// u + h v + M⁻¹ Gᵀ μ, with prescribed dofs at their new values.
-    fn advance(&mut self, rows: &[usize], mu: &[T]) -> Result<()> {
-        self.shifted.copy_from_slice(&self.start.u);
-        T::axpy(T::of(self.h), &self.start.v, self.shifted);
-        for &dof in self.prescribed {
-            self.shifted[dof] = self.new.u[dof];
+    fn advance(&mut self, problem: &JumpProblem<T>) -> Result<()> {
+        let Self { buffers, start, new, projection, g, prescribed, h, .. } = self;
+        let shifted = &mut buffers.shifted;
+        shifted.copy_from_slice(&start.u);
+        T::axpy(T::of(*h), &start.v, shifted);
+        for &dof in *prescribed {
+            shifted[dof] = new.u[dof];
         }
-        self.projection.push(self.g, (rows, mu), T::one(), self.shifted)
+        projection.push(g, (&problem.rows, &problem.totals), T::one(), shifted)
     }
 
     /// Gaps at the shifted displacements; curved gaps are linearized there.
     fn read_gaps(&mut self) -> Result<()> {
-        let Self { t, start, shifted, buffers, constraints, .. } = self;
-        let there = (*t, [&**shifted, &start.v, &start.a]);
-        constraints.0.elsewhere(0, there, (start.t, &start.u), &mut buffers.gaps)
+        let Self { new, start, buffers, constraints, .. } = self;
+        let there = (new.t, [&buffers.shifted[..], &start.v, &start.a]);
+        constraints.0.elsewhere(0, there, (start.t, &start.u), &mut buffers.readings.gaps)
     }
 
     /// μ of the rows, for the gaps at u + h v.
-    fn solve(&mut self, rows: &[usize], mu: &mut Vec<T>) -> Result<()> {
-        self.advance(&[], &[])?;
+    fn solve(&mut self, rows: &[usize], problem: &mut JumpProblem<T>) -> Result<()> {
+        problem.clear();
+        self.advance(problem)?;
         self.read_gaps()?;
-        let Self { buffers, projection, constraints, g, shifted, solver, .. } = self;
-        let Buffers { group, jump, tolerance, sets, gaps, .. } = &mut **buffers;
-        jump.clear();
-        tolerance.clear();
-        sets.clear();
+        let Self { buffers, projection, constraints, g, solver, contacts, .. } = self;
         for &row in rows {
-            jump.push(gaps[row]);
-            tolerance.push(rounding(g.magnitude(row, shifted) + gaps[row].abs()));
-            sets.push(AdmissibleSet::from(constraints.0.law(row)));
+            let gap = buffers.readings.gaps[row];
+            let error = rounding(g.magnitude(row, &buffers.shifted) + gap.abs());
+            problem.add_block(&Block::new(row, 0, AdmissibleSet::from(constraints.0.law(row))));
+            problem.add_row(row, gap, error, T::zero());
         }
-        mu.clear();
-        mu.resize(rows.len(), T::zero());
-        let (jumps, ids) = (Jumps { rows, sets, jump, tolerance }, self.ids);
-        group.solve((g, &mut **projection), &mut **solver, jumps, mu, (self.t, |row| ids[row]))
+        problem.solve((g, projection), &mut **solver, T::one(), (self.new.t, |row| contacts.ids[row]))
     }
 }

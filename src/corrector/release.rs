@@ -51,21 +51,28 @@ impl<T: Real> Corrector<T> for Release {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        // All impulses use the same velocities: contacts that open together have no order.
-        let mut given = std::mem::take(&mut *step.buffers.given);
+        step.with_released(return_energies)
+    }
+}
+
+impl<T: Real> Correction<'_, T> {
+    /// Calls a function with memory for the impulses of contacts that open. All impulses use the same velocities:
+    /// contacts that open together have no order.
+    fn with_released(&mut self, correct: impl FnOnce(&mut Self, &mut Given<T>) -> Result<()>) -> Result<()> {
+        let mut given = std::mem::take(&mut self.buffers.given);
         given.clear();
-        let result = give_back(step, &mut given);
-        *step.buffers.given = given;
+        let result = correct(self, &mut given);
+        self.buffers.given = given;
         result
     }
 }
 
 /// Returns the dissipated energy at every contact that opens.
-fn give_back<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
+fn return_energies<T: Real>(step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
     for i in 0..step.released().len() {
         let row = step.released()[i];
         let taken = step.contacts().dissipated()[row];
-        if taken > T::zero() && !step.withholds(row, taken)? {
+        if taken > T::zero() && !step.keeps_energy(row, taken)? {
             given.rows.push(row);
             given.energies.push(taken);
         }
@@ -170,18 +177,13 @@ impl<T: Real> Corrector<T> for TaylorPapadopoulos {
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
         super::PersistencyCorrection::new().correct(step)?;
-        // All impulses use the same velocities: contacts that open together have no order.
-        let mut given = std::mem::take(&mut *step.buffers.given);
-        given.clear();
-        let result = self.run_off(step, &mut given);
-        *step.buffers.given = given;
-        result
+        step.with_released(|step, given| self.release_stress(step, given))
     }
 }
 
 impl TaylorPapadopoulos {
     /// Applies the impulses of the released contact stress at contacts that open.
-    fn run_off<T: Real>(&self, step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
+    fn release_stress<T: Real>(&self, step: &mut Correction<'_, T>, given: &mut Given<T>) -> Result<()> {
         for i in 0..step.released().len() {
             let row = step.released()[i];
             let force = step.previous_force(row).max(T::zero());
@@ -194,7 +196,7 @@ impl TaylorPapadopoulos {
                 }
             };
             // Contacts that touch without force, or have opened only by rounding, get no impulse.
-            if step.parts_by_rounding(row, s * impulse)?.is_none() {
+            if step.separates_by_rounding(row, s * impulse)?.is_none() {
                 given.rows.push(row);
                 given.impulses.push(impulse);
             }

@@ -1,5 +1,6 @@
 //! Returns the work that contacts without mass do in the step in which they close or open.
 
+use super::correction::Bodies;
 use super::switching::{Switch, Switching};
 use super::{Correction, Corrector, Effects, Requirements};
 use crate::analysis;
@@ -37,17 +38,13 @@ use crate::tableau::Tableau;
 /// [`forces`](crate::ContactState::forces) the force at its end. Friction on such contacts gets the same share of its
 /// impulse.
 ///
-/// Implicit steps of linear systems are solved again with the excess force of such contacts removed over the whole
-/// step, until the energy error is a thousandth of the work (theory, section 15.2); the impulses above return the
-/// remainder. This also works for frequencies that the step does not resolve.
-///
 /// Cost: none in steps in which no such contact closes or opens, two or three solves with the matrix of the stage in
-/// others, and in implicit steps one to eight solves of the step with its contact problem.
+/// others.
 ///
-/// Known failure: nonlinear systems get the impulses only. If many contacts open and close in every step by modes far
-/// faster than the step (ω h ≫ 1), the impulses cannot return all of the work: energy and forces grow, though less
-/// than without the correction. Choose a scheme that damps these modes, such as
-/// [`GeneralizedAlpha`](crate::GeneralizedAlpha).
+/// Known failure: if contacts open and close again and again by modes far faster than the step (ω h ≫ 1), the impulses
+/// cannot return all of the work: energy and forces grow, though less than without the correction.
+/// [`dissipated`](crate::ContactState::dissipated) then becomes large and negative. Choose a scheme that damps these
+/// modes, such as [`GeneralizedAlpha`](crate::GeneralizedAlpha).
 ///
 /// For the trapezoidal rule, Newmark's schemes with γ = ½ (central differences, including
 /// [`CdLagrange`](crate::CdLagrange)) and [`Bathe`](crate::Bathe) with ρ∞ = 1; rows under
@@ -84,7 +81,7 @@ impl<T: Real> Corrector<T> for WorkBalance {
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {
-        step.count_switches();
+        step.book_switches();
         match step.scheme.stage + 1 == step.scheme.stages {
             true => step.return_work(),
             false => Ok(()),
@@ -94,9 +91,9 @@ impl<T: Real> Corrector<T> for WorkBalance {
 
 impl<T: Real> Correction<'_, T> {
     /// Books the work of contacts that have closed or opened in this stage, and bounds the excess of their impulses.
-    fn count_switches(&mut self) {
-        let Self { buffers, contacts, scheme, h, .. } = self;
-        let Switching { start: Some([gaps, forces]), excess, rows, switches, .. } = &mut *buffers.switching else {
+    fn book_switches(&mut self) {
+        let Self { buffers, contacts, scheme, .. } = self;
+        let Switching { start: Some([gaps, forces]), rows, switches, .. } = &mut *buffers.switching else {
             return;
         };
         let half = T::of(0.5);
@@ -105,7 +102,7 @@ impl<T: Real> Correction<'_, T> {
             let (gap, all) = if closes { (gaps[row], &contacts.lambda_raw) } else { (contacts.gap[row], &*forces) };
             let force = all[row];
             contacts.dissipated[row] += if closes { half * gap * force } else { -half * gap * force };
-            let most = [force - excess[row].force, excess[row].force].map(|force| T::of(*h * scheme.length) * force);
+            let most = T::of(scheme.h * scheme.length) * force;
             switches.push(Switch::new(row, most, contacts.tangents.of(row).map(|tangent| all[tangent] / force)));
         }
     }
@@ -117,36 +114,38 @@ impl<T: Real> Correction<'_, T> {
         }
         self.read_rates()?;
         let mut switching = std::mem::replace(&mut *self.buffers.switching, Switching::new(0, None));
-        let result = self.return_to(&mut switching);
+        let result = self.return_by_impulses(&mut switching);
         *self.buffers.switching = switching;
         result
     }
 
-    fn return_to(&mut self, switching: &mut Switching<T>) -> Result<()> {
+    fn return_by_impulses(&mut self, switching: &mut Switching<T>) -> Result<()> {
         let Switching { switches, change, momentum, .. } = switching;
         self.static_rates(change)?;
         for switch in &mut *switches {
             let taken = &mut self.contacts.dissipated[switch.row];
-            let rate = self.g.product(switch.row, change) + self.buffers.rates[switch.row].rate;
+            let rate = self.g.product(switch.row, change) + self.buffers.readings.rates[switch.row].rate;
             let impulse = *taken / rate;
-            switch.impulse = if impulse.is_finite() { impulse.max(-switch.most).min(switch.least) } else { T::zero() };
+            switch.impulse = if impulse.is_finite() { impulse.max(-switch.most).min(T::zero()) } else { T::zero() };
             switch.returned = switch.impulse * rate;
-            let tangents = self.contacts.tangents.of(switch.row);
-            let along =
-                switch.impulses(tangents).skip(1).map(|(tangent, impulse)| impulse * self.g.product(tangent, change));
-            switch.by_friction = along.sum();
             // A contact keeps the energy that it cannot return.
             *taken -= switch.returned;
         }
         for gives in [true, false] {
-            self.give(switches, gives, change, momentum)?;
+            self.apply_returns(switches, gives, change, momentum)?;
         }
         Ok(())
     }
 
     /// Applies the impulses of the contacts that return energy, or of those taking it back, all scaled by one
     /// factor because the contacts act on each other.
-    fn give(&mut self, switches: &[Switch<T>], gives: bool, change: &mut [T], momentum: &mut [T]) -> Result<()> {
+    fn apply_returns(
+        &mut self,
+        switches: &[Switch<T>],
+        gives: bool,
+        change: &mut [T],
+        momentum: &mut [T],
+    ) -> Result<()> {
         let group = || {
             let belongs = |returned: T| if gives { returned > T::zero() } else { returned < T::zero() };
             switches.iter().filter(move |switch| belongs(switch.returned))
@@ -154,19 +153,25 @@ impl<T: Real> Correction<'_, T> {
         if group().next().is_none() {
             return Ok(());
         }
-        self.spread(group(), change)?;
-        momentum.fill(T::zero());
-        self.system.0.mass().add_product(T::one(), change, momentum);
-        // Energies are relative to the obstacles, whose own motion does work.
-        let by_obstacles: T = group().map(|switch| switch.impulse * self.buffers.rates[switch.row].rate).sum();
+        let has_friction = !self.contacts.tangents.is_empty();
+        self.respond(group(), false, change)?;
+        self.momentum_of(change, momentum);
+        // Energies are relative to the obstacles, whose own motion does work. The normal impulses return the energy;
+        // friction does its own work.
+        let by_obstacles: T = group().map(|switch| switch.impulse * self.buffers.readings.rates[switch.row].rate).sum();
         let first = dot(momentum, &self.new.v);
+        if has_friction {
+            self.respond(group(), true, change)?;
+        }
         let second = T::of(0.5) * dot(momentum, change);
         let all: T = group().map(|switch| switch.returned).sum();
-        let by_friction: T = group().map(|switch| switch.by_friction).sum();
-        let (part, left) = nearest([-all, first + by_obstacles - by_friction, second]);
+        let (part, left) = nearest([-all, first + by_obstacles, second]);
         if part <= T::zero() {
-            self.keep(group(), T::one());
+            self.book_unreturned(group(), T::one());
             return Ok(());
+        }
+        if has_friction {
+            self.momentum_of(change, momentum);
         }
         let weight = T::of(self.scheme.covector[0][1]) * part;
         for switch in group() {
@@ -174,8 +179,8 @@ impl<T: Real> Correction<'_, T> {
                 self.contacts.impulse[row] += weight * impulse;
             }
         }
-        self.keep(group(), -left / all);
-        *self.energy += part * (first + part * second);
+        self.book_unreturned(group(), -left / all);
+        *self.energy += part * (dot(momentum, &self.new.v) + T::of(0.5) * part * dot(momentum, change));
         for x in change.iter_mut() {
             *x *= part;
         }
@@ -183,8 +188,14 @@ impl<T: Real> Correction<'_, T> {
         self.damp_change(change)
     }
 
+    /// M times a change of velocity.
+    fn momentum_of(&self, change: &[T], momentum: &mut [T]) {
+        momentum.fill(T::zero());
+        self.bodies.system.0.mass().add_product(T::one(), change, momentum);
+    }
+
     /// Books a fraction of the planned returns as still taken.
-    fn keep<'s>(&mut self, switches: impl Iterator<Item = &'s Switch<T>>, part: T)
+    fn book_unreturned<'s>(&mut self, switches: impl Iterator<Item = &'s Switch<T>>, part: T)
     where
         T: 's,
     {
@@ -195,27 +206,35 @@ impl<T: Real> Correction<'_, T> {
 
     /// The velocities if dofs without mass follow the others statically and no contact holds them.
     fn static_rates(&mut self, rates: &mut [T]) -> Result<()> {
-        let Self { block, operator, system, new, scheme, prescribed, h, .. } = self;
+        let Self { bodies: Bodies { block, operator, system, prescribed, .. }, new, scheme, .. } = self;
         if let Some(block) = block {
             return block.follow(&new.v, rates);
         }
         rates.fill(T::zero());
-        system.0.mass().add_product(T::of(scheme.balance / (*h * *h)), &new.v, rates);
+        system.0.mass().add_product(T::of(scheme.balance / (scheme.h * scheme.h)), &new.v, rates);
         for &dof in *prescribed {
             rates[dof] = T::zero();
         }
         operator.solve(rates)
     }
 
-    /// The velocity change of the dofs with mass by impulses of contacts on dofs without mass.
-    fn spread<'s>(&mut self, switches: impl Iterator<Item = &'s Switch<T>>, change: &mut [T]) -> Result<()>
+    /// The velocity change of the dofs with mass by impulses of contacts on dofs without mass, with their friction or
+    /// without.
+    fn respond<'s>(
+        &mut self,
+        switches: impl Iterator<Item = &'s Switch<T>>,
+        with_friction: bool,
+        change: &mut [T],
+    ) -> Result<()>
     where
         T: 's,
     {
-        let Self { g, block, operator, projection, contacts, scheme, massless, prescribed, h, .. } = self;
+        let Self { g, projection, contacts, scheme, bodies, .. } = self;
+        let Bodies { block, operator, massless, prescribed, .. } = bodies;
         change.fill(T::zero());
         for switch in switches {
-            for (row, impulse) in switch.impulses(contacts.tangents.of(switch.row)) {
+            let tangents = if with_friction { contacts.tangents.of(switch.row) } else { 0..0 };
+            for (row, impulse) in switch.impulses(tangents) {
                 g.scatter(row, impulse, change);
             }
         }
@@ -227,7 +246,7 @@ impl<T: Real> Correction<'_, T> {
             projection.apply_inverse(change)?;
         } else {
             operator.solve(change)?;
-            let scale = T::of(scheme.balance / (*h * *h));
+            let scale = T::of(scheme.balance / (scheme.h * scheme.h));
             for x in change.iter_mut() {
                 *x *= scale;
             }

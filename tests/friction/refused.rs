@@ -46,7 +46,7 @@ fn what_cannot_be_served_is_refused() {
         (scene().constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.3, &[])), "no tangent"),
         (scene().constraint(rigid()).contact_solver(Pivoting::default()), "choose `ActiveSet`"),
         (scene().constraint(rigid()).contact_solver(ProjectedGradient::default()), "choose `ActiveSet`"),
-        (scene().constraint(rigid()).corrector(Release), "knows nothing of friction"),
+        (scene().constraint(rigid()).corrector(Release), "does not support friction"),
         (explicit().constraint(rigid()), "taken"),
         (explicit().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "taken"),
         (without().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "choose another scheme"),

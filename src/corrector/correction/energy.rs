@@ -4,7 +4,7 @@ use super::Correction;
 use crate::corrector::buffers::Given;
 use crate::error::Result;
 use crate::real::Real;
-use crate::rounding::{rounding, share_of_rounding};
+use crate::rounding::{ROUNDINGS_OF_STEP, rounding, share_of_rounding};
 
 impl<T: Real> Correction<'_, T> {
     /// Applies an impulse along a row that changes the kinetic energy relative to the obstacle by `energy`. With a
@@ -24,24 +24,52 @@ impl<T: Real> Correction<'_, T> {
 
     /// The impulse of [`exchange_energy`](Self::exchange_energy).
     fn impulse_of(&mut self, row: usize, energy: T) -> Result<T> {
-        let (s, rate) = (self.compliance(row)?, self.rate(row)?);
+        let s = self.compliance(row)?;
+        self.read_rates()?;
         // The gap rate is a small difference of large numbers; this is its rounding error.
-        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let noise = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.readings.rates[row].rate.abs());
         if !(s > T::zero() && T::of(2.0) * s * energy.abs() > noise * noise && energy.is_finite()) {
             return Ok(T::zero());
         }
-        // ½ S j² + j rate = energy, without cancellation. If the rate has less energy than asked, all of it is taken.
-        let root = (rate * rate + T::of(2.0) * s * energy).max(T::zero()).sqrt();
-        Ok(match rate > T::zero() {
-            true if root > T::zero() => T::of(2.0) * energy / (root + rate),
-            _ => (root - rate) / s,
-        })
+        let mut impulse = [T::one()];
+        Ok(if self.scale_to_energy(&[row], &mut impulse, energy)? { impulse[0] } else { T::zero() })
+    }
+
+    /// Scales impulses along rows by one factor so that together they change the kinetic energy relative to the
+    /// obstacle by `energy`, ½ x² Xᵀ S X + x X · rates = energy, with the root that separates. At most the available
+    /// energy is taken. Returns false, with the impulses unchanged, if there is no such factor.
+    pub(in crate::corrector) fn scale_to_energy(
+        &mut self,
+        rows: &[usize],
+        impulses: &mut [T],
+        energy: T,
+    ) -> Result<bool> {
+        self.projection.assemble(self.g, rows, &mut self.buffers.scratch)?;
+        let (s, rates) = (&self.buffers.scratch, &self.buffers.readings.rates);
+        let (mut first, mut second) = (T::zero(), T::zero());
+        for ((&row, &impulse), column) in rows.iter().zip(&*impulses).zip(s.chunks_exact(rows.len().max(1))) {
+            first += impulse * (self.g.product(row, &self.new.v) + rates[row].rate);
+            second += impulse * column.iter().zip(&*impulses).map(|(&s, &other)| s * other).sum::<T>();
+        }
+        let root = (first * first + T::of(2.0) * second * energy).max(T::zero()).sqrt();
+        // Without cancellation.
+        let factor = match first > T::zero() {
+            true if root > T::zero() => T::of(2.0) * energy / (root + first),
+            _ => (root - first) / second,
+        };
+        let exists = second > T::zero() && factor.is_finite();
+        if exists {
+            for impulse in impulses {
+                *impulse *= factor;
+            }
+        }
+        Ok(exists)
     }
 
     /// Applies impulses that add (positive) energies to the bodies at several rows, all computed from the same
     /// velocities. Coupled impulses are scaled by one factor, so that together they change the energy by the sum.
     pub(in crate::corrector) fn exchange_energies(&mut self, given: &mut Given<T>) -> Result<()> {
-        let Given { rows, energies, impulses, group } = given;
+        let Given { rows, energies, impulses, group, shares } = given;
         for (&row, &energy) in rows.iter().zip(&*energies) {
             impulses.push(self.impulse_of(row, energy)?);
         }
@@ -52,41 +80,21 @@ impl<T: Real> Correction<'_, T> {
             groups = self.projection.groups().len();
         }
         for number in 0..groups {
-            let positions = self.projection.groups().group(number);
-            if positions.len() < 2 {
+            let places = self.projection.groups().group(number);
+            if places.len() < 2 {
                 continue;
             }
-            let coupled = |place: &usize| impulses[*place] != T::zero();
             group.clear();
-            group.extend(positions.iter().copied().filter(coupled));
-            let factor = self.factor_of(group, rows, [energies, impulses])?;
-            for &place in &*group {
-                impulses[place] *= factor;
+            group.extend(places.iter().map(|&place| rows[place]));
+            shares.clear();
+            shares.extend(places.iter().map(|&place| impulses[place]));
+            let energy = places.iter().map(|&place| energies[place]).sum();
+            self.scale_to_energy(group, shares, energy)?;
+            for (&place, &share) in self.projection.groups().group(number).iter().zip(&*shares) {
+                impulses[place] = share;
             }
         }
         self.apply(rows, impulses)
-    }
-
-    /// The factor by which impulses at these places add the sum of their energies.
-    fn factor_of(&mut self, places: &[usize], rows: &[usize], [energies, impulses]: [&[T]; 2]) -> Result<T> {
-        let (mut energy, mut first, mut second) = (T::zero(), T::zero(), T::zero());
-        for &place in places {
-            let (row, impulse) = (rows[place], impulses[place]);
-            let rate = self.g.product(row, &self.new.v) + self.buffers.rates[row].rate;
-            energy += energies[place];
-            first += impulse * rate;
-        }
-        for (i, &place) in places.iter().enumerate() {
-            for &other in &places[..=i] {
-                self.projection.assemble(self.g, &[rows[place], rows[other]], &mut self.buffers.s)?;
-                let twice = if place == other { T::one() } else { T::of(2.0) };
-                second += twice * impulses[place] * self.buffers.s[1] * impulses[other];
-            }
-        }
-        // ½ second x² + first x = energy.
-        let root = (first * first + T::of(2.0) * second * energy).max(T::zero()).sqrt();
-        let factor = if first > T::zero() { T::of(2.0) * energy / (root + first) } else { (root - first) / second };
-        Ok(if factor.is_finite() { factor } else { T::one() })
     }
 
     /// Whether a contact that took `energy` at impact does not return it, because it opens only by rounding: bodies
@@ -94,18 +102,18 @@ impl<T: Real> Correction<'_, T> {
     /// the impact took, which is relative. The force of the impact itself does not count as a holding force; with
     /// damping it is not zero. If a pressed row is a multiple of this row, both are one contact, and the energy
     /// passes to the pressed row.
-    pub(in crate::corrector) fn withholds(&mut self, row: usize, energy: T) -> Result<bool> {
+    pub(in crate::corrector) fn keeps_energy(&mut self, row: usize, energy: T) -> Result<bool> {
         let s = self.compliance(row)?;
         let speed = (T::of(2.0) * s * energy).sqrt();
-        let Some(noise) = self.parts_by_rounding(row, speed)? else { return Ok(false) };
-        let mut pressed = self.buffers.closed.iter().copied().filter(|&other| self.is_pressed(other));
+        let Some(noise) = self.separates_by_rounding(row, speed)? else { return Ok(false) };
+        let mut pressed = self.buffers.rows.closed.iter().copied().filter(|&other| self.is_pressed(other));
         if let Some(other) = pressed.find(|&other| self.g.are_multiples(row, other)) {
             self.contacts.dissipated[row] = T::zero();
             self.contacts.dissipated[other] += energy;
             return Ok(true);
         }
-        let struck = s * self.buffers.struck[row].abs() > T::of(0.1 * self.h) * speed;
-        Ok(struck || T::of(self.h) * s * self.previous_force(row) <= noise)
+        let by_impact = s * self.buffers.rows.impacts[row].abs() > T::of(0.1 * self.scheme.h) * speed;
+        Ok(by_impact || T::of(self.scheme.h) * s * self.previous_force(row) <= noise)
     }
 
     /// Whether a closed row holds its bodies by more than rounding: within a step its force moves the gap, or the
@@ -113,9 +121,9 @@ impl<T: Real> Correction<'_, T> {
     /// share of ε^⅔.
     pub(in crate::corrector) fn holds(&mut self, row: usize, impulse: T) -> Result<bool> {
         let s = self.compliance(row)?;
-        let h = T::of(self.h);
-        let of_rate =
-            share_of_rounding::<T>() * (self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let h = T::of(self.scheme.h);
+        let of_rate = share_of_rounding::<T>()
+            * (self.g.magnitude(row, &self.new.v) + self.buffers.readings.rates[row].rate.abs());
         let magnitude = self.g.magnitude(row, &self.new.u);
         let of_gap = self.constraints.0.gap_rounding(row, magnitude, self.contacts.gap[row]) + h * of_rate;
         let by_force = T::of(self.scheme.response[0].abs()) * h * h * s * self.contacts.lambda_raw[row].abs();
@@ -126,12 +134,12 @@ impl<T: Real> Correction<'_, T> {
 
     /// If gap and gap rate of an opened contact are within rounding, where the rate may be wrong by a share of ε^⅔ of
     /// `speed`: returns the rounding of the rate.
-    pub(in crate::corrector) fn parts_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
+    pub(in crate::corrector) fn separates_by_rounding(&mut self, row: usize, speed: T) -> Result<Option<T>> {
         let rate = self.rate(row)?;
-        let own = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.rates[row].rate.abs());
+        let own = rounding(self.g.magnitude(row, &self.new.v) + self.buffers.readings.rates[row].rate.abs());
         let noise = share_of_rounding::<T>() * speed + own;
-        let of_gap = T::of(16.0) * rounding(self.g.magnitude(row, &self.new.u));
-        let parts = rate <= noise && self.contacts.gap[row] <= T::of(self.h) * noise + of_gap;
-        Ok(parts.then_some(noise))
+        let of_gap = T::of(ROUNDINGS_OF_STEP) * rounding(self.g.magnitude(row, &self.new.u));
+        let separates = rate <= noise && self.contacts.gap[row] <= T::of(self.scheme.h) * noise + of_gap;
+        Ok(separates.then_some(noise))
     }
 }

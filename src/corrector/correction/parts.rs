@@ -15,39 +15,39 @@ impl<'a, T: Real> Correction<'a, T> {
 impl<T: Real> Correction<'_, T> {
     /// Step size.
     pub fn step_size(&self) -> f64 {
-        self.h
+        self.scheme.h
     }
 
     /// Time of the stage.
     pub fn time(&self) -> f64 {
-        self.t
+        self.new.t
     }
 
     /// Closed rows, as indices into the contacts of the state.
     pub fn closed(&self) -> &[usize] {
-        &self.buffers.closed
+        &self.buffers.rows.closed
     }
 
     /// Engaged rows; valid after [`solve_velocity_jumps`](Self::solve_velocity_jumps).
     pub fn engaged(&self) -> &[usize] {
-        &self.buffers.engaged
+        &self.buffers.rows.engaged
     }
 
     /// Rows that were closed before this stage and are open now.
     pub fn opened(&self) -> &[usize] {
-        &self.buffers.opened
+        &self.buffers.rows.opened
     }
 
     /// In the last stage of a step, the rows that were closed in this step or at its start and are open at its end;
     /// none in other stages. Not every scheme reads velocities between stages again, so lasting changes are made to
     /// the state at the end.
     pub fn released(&self) -> &[usize] {
-        &self.buffers.released
+        &self.buffers.rows.released
     }
 
     /// Reported force of a row before this stage, or when it was last closed in this step.
     pub fn previous_force(&self, row: usize) -> T {
-        self.buffers.reported[row]
+        self.buffers.rows.reported[row]
     }
 
     /// Displacements of the stage.
@@ -85,7 +85,7 @@ impl<T: Real> Correction<'_, T> {
     /// unit mass.
     pub fn momentum_weights(&self) -> [f64; 3] {
         let [u, v, a] = self.scheme.covector[0];
-        [u / self.h, v, a * self.h]
+        [u / self.scheme.h, v, a * self.scheme.h]
     }
 
     /// Books an impulse of a contact, for a change made through [`acceleration_mut`](Self::acceleration_mut).
@@ -106,12 +106,12 @@ impl<T: Real> Correction<'_, T> {
     /// Impulses of the [closed](Self::closed) rows, in their order; valid after
     /// [`solve_velocity_jumps`](Self::solve_velocity_jumps).
     pub fn jump_impulses(&self) -> &[T] {
-        &self.buffers.impulses
+        &self.buffers.impulses.normal
     }
 
     /// Forces of the [engaged](Self::engaged) rows, in their order; valid after
     /// [`solve_acceleration_jumps`](Self::solve_acceleration_jumps).
     pub fn jump_forces(&self) -> &[T] {
-        &self.buffers.forces
+        &self.buffers.forces.normal
     }
 }

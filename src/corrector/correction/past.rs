@@ -1,13 +1,26 @@
 //! Edits of past states: projection onto newly closed contacts, and velocity changes applied together with the
 //! state's.
 
-use super::{Buffers, Correction};
+use super::{Correction, Past};
+use crate::contact_solver::AdmissibleSet;
+use crate::corrector::Buffers;
+use crate::corrector::buffers::Readings;
+use crate::corrector::jump_problem::Block;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::rounding;
 
 /// Largest accepted ratio of the distance that a projection moves the past, in the mass norm, to the distance with
 /// the current rows.
-pub(super) const FARTHEST: f64 = 2.0;
+const FARTHEST: f64 = 2.0;
+
+/// Which rows measure the gaps of a past state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MeasuredBy {
+    /// Its own rows.
+    PastRows,
+    CurrentRows,
+}
 
 impl<T: Real> Correction<'_, T> {
     /// If an engaged row has just closed: projects gap, gap rate and gap acceleration of the engaged rows to zero in
@@ -20,137 +33,175 @@ impl<T: Real> Correction<'_, T> {
     /// [`Error::Incompatible`](crate::Error::Incompatible) if the corrector's
     /// [`edits`](crate::corrector::Effects::edits) is not [`Edits::Past`](crate::corrector::Edits::Past).
     pub fn project_past(&mut self) -> Result<()> {
-        let leave = self.note_outgoing()?;
-        let begins = |&row: &usize| !self.was_closed[row] || self.sticks(row) && !self.was_sticking[row];
-        if !leave && !self.buffers.engaged.iter().any(begins) {
+        let leave = self.record_outgoing()?;
+        let begins = |&row: &usize| !self.before.closed[row] || self.sticks(row) && !self.before.sticking[row];
+        if !leave && !self.buffers.rows.engaged.iter().any(begins) {
             return Ok(());
         }
-        self.backup.check()?;
-        let mut rows = std::mem::take(&mut self.buffers.engaged);
+        self.past.backup.check()?;
+        let mut rows = std::mem::take(&mut self.buffers.rows.engaged);
         if leave {
             rows.extend(self.buffers.rebounds.contacts(self.g));
             rows.sort_unstable();
         }
-        let mut closing = match self.rubs() {
-            true => self.read_slip_rates(),
-            false => self.close(&rows),
-        };
-        // Past states not known yet, while a multistep scheme is started, have no covector.
-        let places = self.past.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1));
-        if closing.is_ok() && self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
-            self.backup.keep(self.past);
-            for k in 1..=places {
-                for field in 0..3 {
-                    if closing.is_ok() && self.scheme.read[k][field] {
-                        closing = match self.rubs() {
-                            true => self.project_rubbing_field(k, field, &rows),
-                            false => self.project_field(k, field, &rows),
-                        };
-                    }
-                }
-            }
-        }
+        let result = self.project_fields(&rows);
         rows.retain(|&row| !self.buffers.rebounds.leaves(row));
-        self.buffers.engaged = rows;
-        closing
+        self.buffers.rows.engaged = rows;
+        result
     }
 
-    /// Projects one field of past state k onto the engaged rows.
-    fn project_field(&mut self, k: usize, field: usize, rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, projection, contacts, scheme, h, new, .. } = self;
-        let Buffers { gaps, jump, tolerance: before, rebounds, .. } = &mut **buffers;
-        let motion = &mut past[k - 1];
-        let ago = T::of(new.t - motion.t);
-        let (h, psi) = (*h, scheme.covector.get(k).map_or(0.0, |c| c[field]));
-        // The past motion uses its own part of a curved surface, so that u, v and a agree.
-        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
-        // The value at which a gap is held under a law that reads it at the start of a stage.
-        let held = |row: usize| match field == 0 && constraints.0.law(row).reads_start() {
-            true => contacts.gap[row],
-            false => rebounds.past(row, field, ago),
-        };
-        jump.clear();
-        jump.extend(rows.iter().map(|&row| gaps[row] - held(row)));
-        before.clear();
-        before.extend_from_slice(jump);
-        projection.solve(jump);
-        if constraints.0.turn() {
-            self.see_straight((k, field), rows)?;
+    /// Whether an engaged contact sticks.
+    fn sticks(&self, row: usize) -> bool {
+        self.contacts.sliding.get(row) == Some(&false) && !self.contacts.tangents.of(row).is_empty()
+    }
+
+    /// The number of past states that may be edited. States not known yet, while a multistep scheme is started, have
+    /// no covector.
+    fn places(&self) -> usize {
+        self.past.states.len().min(self.scheme.read.len().min(self.scheme.covector.len()).saturating_sub(1))
+    }
+
+    /// Projects all past values that later rows read.
+    fn project_fields(&mut self, rows: &[usize]) -> Result<()> {
+        let places = self.places();
+        if !self.scheme.read[1..=places].iter().flatten().any(|&read| read) {
+            return Ok(());
         }
-        if field == 2 {
-            let mut forces = std::mem::take(&mut self.buffers.jump);
-            let result = self.limit_forces(rows, &mut forces, T::zero());
-            self.buffers.jump = forces;
-            result?;
-        }
-        let Self { past, constraints, buffers, projection, g, contacts, scheme, energy, closed_at_start, .. } = self;
-        let Buffers { rates, jump, tolerance: before, rebounds, .. } = &mut **buffers;
-        let motion = &mut past[k - 1];
-        let ago = T::of(self.t - motion.t);
-        // In a stage before the last, the state at the start of the step loses energy that later stages do not see.
-        if field == 1 && !scheme.is_last() && k == scheme.stage + 1 {
-            constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
-            for ((&row, &multiplier), &before) in rows.iter().zip(jump.iter()).zip(before.iter()) {
-                let taken = multiplier * (T::of(0.5) * before + rebounds.past(row, field, ago));
-                contacts.dissipated[row] += taken;
-                if closed_at_start[row] {
-                    **energy += multiplier * rates[row].rate - taken;
-                }
+        self.read_slip_rates()?;
+        self.past.backup.keep(self.past.states);
+        for k in 1..=places {
+            for field in (0..3).filter(|&field| self.scheme.read[k][field]) {
+                self.project_field(k, field, rows)?;
             }
         }
+        Ok(())
+    }
+
+    /// Projects one field of past state k onto the engaged contacts: gaps and their rates vanish, and slips if the
+    /// contact sticks. If it slides, the past gets the friction of the normal impulse applied here.
+    fn project_field(&mut self, k: usize, field: usize, engaged: &[usize]) -> Result<()> {
+        let Self { past, constraints, buffers, new, .. } = self;
+        let Readings { gaps, past_slips, .. } = &mut buffers.readings;
+        let motion = &past.states[k - 1];
+        // The past motion uses its own part of a curved surface, so that u, v and a agree.
+        constraints.0.elsewhere(field, motion.place(), (new.t, &new.u), gaps)?;
+        constraints.0.slip_rates(motion.t, &motion.u, &motion.v, past_slips)?;
+        if self.constraints.0.turn() {
+            // Rows that are nearly equal, but have turned in between, may contradict each other in the past and
+            // together move it very far. With the current rows it moves at most as far as the bodies have moved.
+            let current = self.solve_past((k, field), engaged, MeasuredBy::CurrentRows)?;
+            let own = self.solve_past((k, field), engaged, MeasuredBy::PastRows)?;
+            if own > T::of(FARTHEST * FARTHEST) * current {
+                self.solve_past((k, field), engaged, MeasuredBy::CurrentRows)?;
+            }
+        } else {
+            self.solve_past((k, field), engaged, MeasuredBy::PastRows)?;
+        }
+        if field == 2 {
+            let problem = &mut self.buffers.problem;
+            let (rows, mut increments) = (std::mem::take(&mut problem.rows), std::mem::take(&mut problem.increments));
+            let result = self.limit_forces(&rows, &mut increments, T::zero());
+            (self.buffers.problem.rows, self.buffers.problem.increments) = (rows, increments);
+            result?;
+        }
+        // In a stage before the last, the state at the start of the step loses energy that later stages do not see.
+        if field == 1 && !self.scheme.is_last() && k == self.scheme.stage + 1 {
+            self.book_past(k)?;
+        }
+        let Self { past, buffers, projection, g, contacts, scheme, .. } = self;
+        let problem = &buffers.problem;
+        let (motion, h) = (&mut past.states[k - 1], scheme.h);
+        let psi = scheme.covector.get(k).map_or(0.0, |c| c[field]);
         let (values, unit) = match field {
             0 => (&mut motion.u, psi / h),
             1 => (&mut motion.v, psi),
             _ => (&mut motion.a, psi * h),
         };
-        projection.push(g, (rows, jump), -T::one(), values)?;
-        for (&row, &multiplier) in rows.iter().zip(jump.iter()) {
-            contacts.impulse[row] -= T::of(unit) * multiplier;
+        projection.push(g, (&problem.rows, &problem.increments), T::one(), values)?;
+        for (&row, &multiplier) in problem.rows.iter().zip(&problem.increments) {
+            contacts.impulse[row] += T::of(unit) * multiplier;
         }
         Ok(())
     }
 
-    /// Uses the jumps of one field of past state k measured with the current rows, if the rows of the past would move
-    /// it much farther. Rows that are nearly equal, but have turned in between, may contradict each other in the past
-    /// and together move it very far. With the current rows it moves at most as far as the bodies have moved.
-    fn see_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
-        self.look_straight((k, field), rows)?;
-        let Self { buffers, projection, past, new, .. } = self;
-        let Buffers { jump, tolerance: before, straight, by_straight, rebounds, .. } = &mut **buffers;
-        let ago = T::of(new.t - past[k - 1].t);
-        for (straight, &row) in straight.iter_mut().zip(rows) {
-            *straight -= rebounds.past(row, field, ago);
-        }
-        by_straight.clear();
-        by_straight.extend_from_slice(straight);
-        projection.solve(by_straight);
-        let square = |jumps: &[T], by: &[T]| jumps.iter().zip(by).map(|(&jump, &by)| jump * by).sum::<T>();
-        if square(before, jump) > T::of(FARTHEST * FARTHEST) * square(straight, by_straight) {
-            std::mem::swap(before, straight);
-            std::mem::swap(jump, by_straight);
-        }
-        Ok(())
-    }
-
-    /// Computes one field of past state k with the current rows.
-    pub(super) fn look_straight(&mut self, (k, field): (usize, usize), rows: &[usize]) -> Result<()> {
-        let Self { past, constraints, buffers, g, contacts, new, .. } = self;
-        let Buffers { rates, straight, .. } = &mut **buffers;
-        let motion = &past[k - 1];
-        constraints.0.rates(new.t, &new.u, &new.v, rates)?;
-        let since = T::of(new.t - motion.t);
-        let by_rows = |row: usize| match field {
-            0 => {
-                let way = g.product(row, &new.u) - g.product(row, &motion.u);
-                let held = if constraints.0.law(row).reads_start() { T::zero() } else { contacts.gap[row] };
-                held - way - since * rates[row].rate
+    /// Books the energy that the projection of the velocities of past state k takes.
+    fn book_past(&mut self, k: usize) -> Result<()> {
+        let Self { past, constraints, buffers, contacts, energy, before: previous, new, .. } = self;
+        let Buffers { problem, rebounds, readings: Readings { rates, past_slips, .. }, .. } = &mut **buffers;
+        let motion = &past.states[k - 1];
+        let ago = T::of(new.t - motion.t);
+        constraints.0.rates(motion.t, &motion.u, &motion.v, rates)?;
+        let first = constraints.0.tangents().all().start;
+        let jumps = problem.jump.iter().zip(&problem.left);
+        for ((&row, &impulse), (&before, &after)) in problem.rows.iter().zip(&problem.increments).zip(jumps) {
+            let gain = impulse * (T::of(0.5) * (before + after) + rebounds.past(row, 1, ago));
+            let own = if row < first { rates[row].rate } else { past_slips[row - first].rate };
+            if previous.closed_at_start[contacts.tangents.owner(row)] {
+                **energy += gain - impulse * own;
             }
-            1 => g.product(row, &motion.v) + rates[row].rate,
-            _ => g.product(row, &motion.a) + rates[row].acceleration,
-        };
-        straight.clear();
-        straight.extend(rows.iter().map(|&row| by_rows(row)));
+            if row < first {
+                contacts.dissipated[row] -= gain;
+            }
+        }
         Ok(())
+    }
+
+    /// Finds the multipliers that project one field of past state k onto the engaged contacts. Returns the squared
+    /// distance that the past moves in the mass norm.
+    fn solve_past(&mut self, (k, field): (usize, usize), engaged: &[usize], by: MeasuredBy) -> Result<T> {
+        let Self { past, constraints, buffers, projection, solver, g, contacts, new, .. } = self;
+        let Buffers { problem, rebounds, readings, .. } = &mut **buffers;
+        let Readings { rates, gaps, slips, past_slips } = readings;
+        let motion = &past.states[k - 1];
+        let ago = T::of(new.t - motion.t);
+        if by == MeasuredBy::CurrentRows {
+            constraints.0.rates(new.t, &new.u, &new.v, rates)?;
+        }
+        let tangents = constraints.0.tangents();
+        let first = tangents.all().start;
+        let moved = |row: usize| g.row(row).map(|(dof, weight)| weight * (motion.u[dof] - new.u[dof])).sum::<T>();
+        let gap = |row: usize| match (by, field) {
+            (MeasuredBy::PastRows, _) => gaps[row],
+            (MeasuredBy::CurrentRows, 0) => contacts.gap[row] + moved(row) - ago * rates[row].rate,
+            (MeasuredBy::CurrentRows, 1) => g.product(row, &motion.v) + rates[row].rate,
+            (MeasuredBy::CurrentRows, _) => g.product(row, &motion.a) + rates[row].acceleration,
+        };
+        let slip = |row: usize| match field {
+            // From the current position back along the motion of the obstacle.
+            0 => moved(row) - ago * (slips[row - first].rate - T::of(0.5) * ago * slips[row - first].acceleration),
+            1 => g.product(row, &motion.v) + past_slips[row - first].rate,
+            _ => g.product(row, &motion.a) + past_slips[row - first].acceleration,
+        };
+        // A law that reads the gap at the start of a stage holds it at its current value.
+        let target = |row: usize| match field == 0 && row < first && constraints.0.law(row).reads_start() {
+            true => contacts.gap[row],
+            false => rebounds.past(row, field, ago),
+        };
+        problem.clear();
+        for &row in engaged {
+            let own = tangents.of(row);
+            let slides = !own.is_empty() && contacts.sliding[row] && !rebounds.leaves(row);
+            if slides {
+                let direction = problem.direction(row).map(|f| T::of(tangents.friction(row)) * f);
+                let set = AdmissibleSet::with_friction(0.0, own.len(), true);
+                problem.add_block(&Block { direction: Some(direction), ..Block::new(row, own.len(), set) });
+            }
+            for row in std::iter::once(row).chain(own) {
+                if !slides {
+                    problem.add_block(&Block::new(row, 0, AdmissibleSet::Free));
+                }
+                let jump = if row < first { gap(row) } else { slip(row) } - target(row);
+                let values = [&motion.u, &motion.v, &motion.a][field];
+                problem.add_row(row, jump, rounding(g.magnitude(row, values) + jump.abs()), T::zero());
+            }
+        }
+        // A body that came from a positive gap has received a positive impulse: its past displacement is moved back
+        // accordingly.
+        let presses = if field == 0 { -T::one() } else { T::one() };
+        let ids = &contacts.ids;
+        problem.solve((g, projection), &mut **solver, presses, (new.t, |row: usize| ids[tangents.owner(row)]))?;
+        let changes = problem.jump.iter().zip(&problem.left).map(|(&jump, &left)| left - jump);
+        Ok(problem.increments.iter().zip(changes).map(|(&multiplier, change)| multiplier * change).sum())
     }
 
     /// Changes past states as if they had always had the velocity change of an impulse: v_k += Δv, u_k −= k h Δv if
@@ -164,20 +215,19 @@ impl<T: Real> Correction<'_, T> {
     /// [`edits`](crate::corrector::Effects::edits) is not [`Edits::Past`](crate::corrector::Edits::Past); the
     /// errors of [`compliances`](Self::compliances).
     pub fn move_past(&mut self, row: usize, impulse: T) -> Result<()> {
-        let Self { past, backup, projection, g, contacts, scheme, h, .. } = self;
-        // Past states not known yet, while a multistep scheme is started, have no covector; states between stages are
-        // dropped.
-        let places = past.len().min(scheme.read.len().min(scheme.covector.len()).saturating_sub(1));
+        let places = self.places();
+        let Self { past: Past { states, backup }, projection, g, contacts, scheme, .. } = self;
+        // States between stages are dropped.
         let first = scheme.stages;
         if (first..=places).any(|k| scheme.read[k][0] || scheme.read[k][1]) {
             backup.check()?;
-            backup.keep(past);
+            backup.keep(states);
         }
         for k in first..=places {
-            let (motion, steps) = (&mut past[k - 1], (k + 1 - scheme.stages) as f64);
+            let (motion, steps) = (&mut states[k - 1], (k + 1 - scheme.stages) as f64);
             let [by_u, by_v, _] = scheme.covector[k];
             if scheme.read[k][0] {
-                projection.push(g, (&[row], &[impulse]), T::of(-steps * *h), &mut motion.u)?;
+                projection.push(g, (&[row], &[impulse]), T::of(-steps * scheme.h), &mut motion.u)?;
                 contacts.impulse[row] -= T::of(steps * by_u) * impulse;
             }
             if scheme.read[k][1] {

@@ -3,6 +3,7 @@
 use super::{Correction, Pressed};
 use crate::contact::{ContactJacobian, GapRates};
 use crate::corrector::Buffers;
+use crate::corrector::buffers::{Readings, StageRows};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::{rounding, share_of_rounding};
@@ -14,14 +15,13 @@ pub(in crate::corrector) struct Rebounds<T> {
     any: bool,
     /// The rate before the impact, and the required rate after it: zero if the contact is to stay.
     before: Vec<T>,
-    target: Vec<T>,
+    targets: Vec<T>,
     /// The fraction of the target rates that adds no energy.
     share: T,
     /// The contacts that leave, ascending, and their tangential rows.
     leaving: Vec<usize>,
     /// Their rates and accelerations.
     outgoing: Vec<[T; 2]>,
-    forces: Vec<T>,
 }
 
 impl<T: Real> Rebounds<T> {
@@ -31,8 +31,8 @@ impl<T: Real> Rebounds<T> {
     }
 
     /// The required rate of a row.
-    pub(super) fn asked(&self, row: usize) -> T {
-        if self.any { self.share * self.target[row] } else { T::zero() }
+    pub(super) fn target(&self, row: usize) -> T {
+        if self.any { self.share * self.targets[row] } else { T::zero() }
     }
 
     /// Whether a contact leaves; also true for the rows of its friction.
@@ -69,19 +69,20 @@ impl<T: Real> Correction<'_, T> {
         self.buffers.rebounds.any = false;
         self.buffers.rebounds.leaving.clear();
         let may_rebound = |row: &usize| self.constraints.0.law(*row).rebounds();
-        if !self.buffers.closed.iter().any(may_rebound) || self.past.is_empty() {
+        if !self.buffers.rows.closed.iter().any(may_rebound) || self.past.states.is_empty() {
             return Ok(false);
         }
         self.read_rates()?;
-        let Self { buffers, constraints, g, past, new, was_closed, h, .. } = self;
-        let Buffers { rebounds, closed, gaps, rates, .. } = &mut **buffers;
-        let (Some(start), h) = (past.first(), T::of(*h)) else { return Ok(false) };
-        let comes = |&row: &usize| !was_closed[row] || g.product(row, &start.v) + rates[row].rate < T::zero();
+        let Self { buffers, constraints, g, past, new, before, scheme, .. } = self;
+        let Buffers { rebounds, rows: StageRows { closed, .. }, readings: Readings { gaps, rates, .. }, .. } =
+            &mut **buffers;
+        let (Some(start), h) = (past.states.first(), T::of(scheme.h)) else { return Ok(false) };
+        let comes = |&row: &usize| !before.closed[row] || g.product(row, &start.v) + rates[row].rate < T::zero();
         if !closed.iter().any(|row| constraints.0.law(*row).rebounds() && comes(row)) {
             return Ok(false);
         }
-        let Rebounds { before, target, outgoing, share, .. } = &mut **rebounds;
-        for values in [&mut *before, target] {
+        let Rebounds { before, targets, outgoing, share, .. } = &mut **rebounds;
+        for values in [&mut *before, targets] {
             values.clear();
             values.resize(g.rows(), T::zero());
         }
@@ -99,8 +100,8 @@ impl<T: Real> Correction<'_, T> {
                 }
             }
         }
-        for k in 0..self.buffers.closed.len() {
-            let row = self.buffers.closed[k];
+        for k in 0..self.buffers.rows.closed.len() {
+            let row = self.buffers.rows.closed[k];
             let e = self.constraints.0.law(row).restitution().unwrap_or(0.0);
             let (rate, [gap, acceleration]) = (self.buffers.rebounds.before[row], self.buffers.rebounds.outgoing[row]);
             let square = rate * rate - T::of(2.0) * acceleration * gap;
@@ -110,17 +111,19 @@ impl<T: Real> Correction<'_, T> {
             let approach = square.sqrt();
             // A contact that would return within two steps, pulled by loads that its force also balances, stays: it
             // would chatter.
-            let pulled = self.compliance(row)? * self.buffers.reported[row].max(T::zero()) - acceleration;
+            let pulled = self.compliance(row)? * self.buffers.rows.reported[row].max(T::zero()) - acceleration;
             let least = (h * pulled).max(self.noise_of_rate(row, h));
-            let Rebounds { any, before, target, .. } = &mut *self.buffers.rebounds;
+            let Rebounds { any, before, targets, .. } = &mut *self.buffers.rebounds;
             before[row] = -approach;
             if T::of(e) * approach > least {
-                (target[row], *any) = (T::of(e) * approach, true);
+                (targets[row], *any) = (T::of(e) * approach, true);
             }
         }
         let Self { buffers, constraints, g, past, .. } = self;
-        let Buffers { rebounds, past_slips, .. } = &mut **buffers;
-        let (Some(start), Rebounds { any, before, .. }) = (past.first(), &mut **rebounds) else { return Ok(false) };
+        let Buffers { rebounds, readings: Readings { past_slips, .. }, .. } = &mut **buffers;
+        let (Some(start), Rebounds { any, before, .. }) = (past.states.first(), &mut **rebounds) else {
+            return Ok(false);
+        };
         let tangents = constraints.0.tangents();
         if *any && !tangents.is_empty() {
             past_slips.resize(past_slips.len().max(tangents.len()), GapRates::default());
@@ -135,7 +138,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// The rounding error of a rate, as in the jumps of a step.
     fn noise_of_rate(&self, row: usize, h: T) -> T {
-        let Some(start) = self.past.first() else { return T::zero() };
+        let Some(start) = self.past.states.first() else { return T::zero() };
         let share = share_of_rounding::<T>();
         let of_gap = self.constraints.0.gap_rounding(row, self.g.magnitude(row, &start.u), self.contacts.gap[row]);
         let of_rates = self.g.magnitude(row, &start.v) + h * self.g.magnitude(row, &start.a);
@@ -148,25 +151,25 @@ impl<T: Real> Correction<'_, T> {
     pub(super) fn solve_rebounds(&mut self) -> Result<()> {
         /// Halvings of the share.
         const HALVINGS: usize = 45;
-        self.solve_rubbing_velocity(Pressed::MayPart)?;
+        self.solve_velocity(Pressed::MaySeparate)?;
         if self.rebounds_gain() {
             let half = T::of(0.5);
             let (mut least, mut most) = (T::zero(), T::one());
             for _ in 0..HALVINGS {
                 self.buffers.rebounds.share = half * (least + most);
-                self.solve_rubbing_velocity(Pressed::MayPart)?;
+                self.solve_velocity(Pressed::MaySeparate)?;
                 let bound = if self.rebounds_gain() { &mut most } else { &mut least };
                 *bound = self.buffers.rebounds.share;
             }
             self.buffers.rebounds.share = least;
-            self.solve_rubbing_velocity(Pressed::MayPart)?;
+            self.solve_velocity(Pressed::MaySeparate)?;
         }
         let Self { buffers, constraints, contacts, .. } = self;
-        let Buffers { rebounds, rubbing, engaged, .. } = &mut **buffers;
-        for block in &rubbing.blocks {
-            let total = rubbing.totals[block.places().start];
+        let Buffers { rebounds, problem, rows: StageRows { engaged, .. }, .. } = &mut **buffers;
+        for block in &problem.blocks {
+            let total = problem.totals[block.place];
             let parts = total == T::zero() && contacts.lambda_raw[block.row] > T::zero();
-            if !block.set.is_bilateral() && (parts || total > T::zero() && rebounds.asked(block.row) > T::zero()) {
+            if !block.set.is_bilateral() && (parts || total > T::zero() && rebounds.target(block.row) > T::zero()) {
                 rebounds.leaving.push(block.row);
             }
         }
@@ -181,41 +184,38 @@ impl<T: Real> Correction<'_, T> {
 
     /// Whether the impulses add energy: X·(ẏ⁻ + ẏ′)/2 over all rows.
     fn rebounds_gain(&self) -> bool {
-        let Buffers { rebounds, rubbing, .. } = &*self.buffers;
+        let Buffers { rebounds, problem, .. } = &*self.buffers;
         let (mut work, mut size) = (T::zero(), T::zero());
-        for ((&row, &total), &left) in rubbing.rows.iter().zip(&rubbing.totals).zip(&rubbing.left) {
-            let [before, after] = [rebounds.before[row], left + rebounds.asked(row)];
+        for ((&row, &total), &left) in problem.rows.iter().zip(&problem.totals).zip(&problem.left) {
+            let [before, after] = [rebounds.before[row], left + rebounds.target(row)];
             work += total * (before + after);
             size += total.abs() * (before.abs() + after.abs());
         }
-        work > T::epsilon().sqrt() * T::epsilon().sqrt().sqrt() * size
+        work > share_of_rounding::<T>() * size
     }
 
     /// Removes the forces of leaving contacts from the accelerations and from the reported forces: they no longer
     /// act.
     pub(super) fn release_rebounds(&mut self) -> Result<()> {
-        let share = T::of(self.scheme.balance / self.scheme.acceleration);
-        let Rebounds { leaving, forces, .. } = &mut *self.buffers.rebounds;
-        let (rows, mut forces) = (std::mem::take(leaving), std::mem::take(forces));
-        forces.clear();
-        forces.extend(rows.iter().map(|&row| -self.contacts.lambda_raw[row] / share));
-        let result = self.push_forces(&rows, &forces);
+        let rows = std::mem::take(&mut self.buffers.rebounds.leaving);
+        let result = self.remove_raw_forces(&rows);
         for &row in &rows {
             self.contacts.lambda[row] = T::zero();
+            self.contacts.lambda_v[row] = -T::of(self.scheme.h / self.scheme.balance) * self.contacts.lambda_raw[row];
         }
-        (self.buffers.rebounds.leaving, self.buffers.rebounds.forces) = (rows, forces);
+        self.buffers.rebounds.leaving = rows;
         result
     }
 
     /// Stores rates and accelerations of leaving contacts; returns whether there are any.
-    pub(super) fn note_outgoing(&mut self) -> Result<bool> {
+    pub(super) fn record_outgoing(&mut self) -> Result<bool> {
         if self.buffers.rebounds.leaving.is_empty() {
             return Ok(false);
         }
         self.read_rates()?;
         self.read_slip_rates()?;
         let Self { buffers, constraints, g, new, .. } = self;
-        let Buffers { rebounds, rates, slips, .. } = &mut **buffers;
+        let Buffers { rebounds, readings: Readings { rates, slips, .. }, .. } = &mut **buffers;
         let first = constraints.0.tangents().all().start;
         for &row in &rebounds.leaving {
             let own = if g.is_tangential(row) { slips[row - first] } else { rates[row] };

@@ -2,7 +2,7 @@
 //! before.
 
 use crate::contact::ContactJacobian;
-use crate::corrector::{Backup, Buffers, Corrector, Edits, JumpProjection};
+use crate::corrector::{Backup, Buffers, Corrector, Edits, Effects, JumpProjection};
 use crate::error::Result;
 use crate::ranks::Together;
 use crate::real::Real;
@@ -12,7 +12,6 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::contact_rows::ContactRowsWork;
 use crate::simulation::run::impulses::Impulses;
 use crate::simulation::stage::contact::ContactWork;
-use crate::simulation::stage::excess_forces::ExcessForces;
 use crate::simulation::stage::massless::{MasslessBlock, is_damped};
 use crate::simulation::stage::newton::NewtonWork;
 use crate::simulation::stage::supports::Supports;
@@ -32,8 +31,6 @@ pub(crate) struct Workspace<T: Real> {
     pub(crate) massless: Vec<usize>,
     /// For explicit schemes, if there are dofs without mass.
     pub(crate) block: Option<MasslessBlock<T>>,
-    /// For implicit schemes, if the work of contacts on dofs without mass is balanced.
-    pub(crate) excess: Option<Box<ExcessForces<T>>>,
     pub(crate) correction: CorrectionWork<T>,
     pub(crate) rate_check: RateCheck<T>,
     /// For schemes with a stability limit that may be reached in the run.
@@ -51,8 +48,6 @@ pub(crate) struct CorrectionWork<T: Real> {
     pub(crate) projection: Option<JumpProjection<T>>,
     /// Version of the rows for which the projection was made.
     pub(crate) projected_rows: u64,
-    /// For correctors that act on the prediction, one entry a dof.
-    pub(crate) shifted: Vec<T>,
     /// Change of kinetic energy by corrections in this step.
     pub(crate) energy: T,
 }
@@ -89,16 +84,15 @@ impl<T: Real> Workspace<T> {
         let dofs = system.dofs();
         let &ContactSize { rows, entries, interface, may_press } = contact;
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
-        let balances = may_press && correctors.iter().any(|corrector| corrector.effects().corrects_massless);
-        let edits_past = correctors.iter().any(|corrector| corrector.effects().edits == Edits::Past);
+        let effects = Effects::of_all(correctors);
+        let balances = may_press && effects.corrects_massless;
         let room = |needed: bool| if needed && may_press { dofs } else { 0 };
         let mut targets = program.stages.iter().filter_map(|stage| stage.contact.as_ref());
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
         let supports = Supports::of(system);
         let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
-        contact_rows.slips.by_displacement =
-            correctors.iter().any(|corrector| corrector.effects().leaves_smooth_motion);
+        contact_rows.slips.by_displacement = effects.leaves_smooth_motion;
         Self {
             contact: ContactWork {
                 interface: InterfaceWork::new(interface),
@@ -121,19 +115,17 @@ impl<T: Real> Workspace<T> {
             newton: None,
             massless: Vec::new(),
             block: None,
-            excess: None,
             correction: CorrectionWork {
-                buffers: Buffers::new(rows, damped, balances.then_some(dofs)),
+                buffers: Buffers::new(rows, [damped, room(effects.predicts)], balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
                 projected_rows: 0,
-                shifted: vec![T::zero(); room(correctors.iter().any(|corrector| corrector.effects().predicts))],
                 energy: T::zero(),
             },
             rate_check: RateCheck::new(rows),
             stiffening: None,
             rows,
             rates: [Vec::new(), Vec::new()],
-            backup: Backup::new(if edits_past { slots - 1 } else { 0 }, dofs),
+            backup: Backup::new(if effects.edits == Edits::Past { slots - 1 } else { 0 }, dofs),
         }
     }
 
@@ -143,15 +135,13 @@ impl<T: Real> Workspace<T> {
         &mut self,
         massless: Vec<usize>,
         (system, together): (&mut dyn System<T>, &Together<T>),
-        (program, follower): (&Program<T>, Option<String>),
+        follower: Option<String>,
         at: &Motion<T>,
         interface: &[usize],
     ) -> Result<()> {
         if let Some(name) = follower {
             self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
             self.contact.rows.massless.acts = vec![false; self.rows];
-        } else if self.correction.buffers.switching.is_on() && self.correction.shifted.is_empty() {
-            self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
         }
         let buffers = &mut self.correction.buffers;
         if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
@@ -161,7 +151,7 @@ impl<T: Real> Workspace<T> {
                 Linearity::Nonlinear => Ok(!massless.is_empty()),
             };
             let [damps] = together.max(damps.map(|damps| [f64::from(u8::from(damps))]))?;
-            buffers.damps_massless = damps > 0.0;
+            buffers.damping.on_massless = damps > 0.0;
         }
         self.contact.rows.massless.dofs.clone_from(&massless);
         self.massless = massless;
@@ -178,9 +168,6 @@ impl<T: Real> Workspace<T> {
             flags.reserve(rows.saturating_sub(flags.len()));
         }
         self.correction.buffers.make_room(rows);
-        if let Some(excess) = &mut self.excess {
-            excess.make_room(rows);
-        }
         self.rate_check.make_room(rows);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactId, ContactLaw, Course};
 use crate::contact_solver::AdmissibleSet;
-use crate::corrector::{Block, Gaps, Rubbing, slides};
+use crate::corrector::{Block, Gaps, JumpProblem, slides};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::{half_digits, rounding};
@@ -266,21 +266,21 @@ impl<T: Real> StartProblem<T> {
 
     /// Solves for the rows that take part: resting contacts stick or slip, a sliding one has its friction direction.
     fn solve_rows(&mut self, start: &mut Start<'_, '_, T>, t: f64) -> Result<()> {
-        let mut problem = Rubbing::default();
+        let mut problem = JumpProblem::default();
         let known = self.known.iter().map(|&(row, force)| (row, Some(force)));
         for (row, known) in self.rows.iter().map(|&row| (row, None)).chain(known) {
             let (block, own) = self.block(start, row);
             let slide = self.sliding.iter().find(|slide| slide.contact == row && !own.is_empty());
             let direction = slide.and_then(|slide| slide.friction(start.constraints.tangents()));
-            problem.push(&Block { direction, known, ..block });
+            problem.add_block(&Block { direction, known, ..block });
             match known {
-                Some(_) => problem.demand(row, T::zero(), T::zero(), T::zero()),
-                None => problem.demand(row, self.offset[row], self.tolerance[row], T::zero()),
+                Some(_) => problem.add_row(row, T::zero(), T::zero(), T::zero()),
+                None => problem.add_row(row, self.offset[row], self.tolerance[row], T::zero()),
             }
             for (k, row) in own.enumerate() {
                 let over = slide.zip(self.h).map_or(T::zero(), |(slide, h)| slide.to_stop(h)[k]);
                 let tolerance = self.tolerance[row] + rounding(over.abs());
-                problem.demand(row, self.offset[row] + over, tolerance, T::zero());
+                problem.add_row(row, self.offset[row] + over, tolerance, T::zero());
             }
         }
         let Start { constraints, g, projection, contact_solver, .. } = start;
@@ -303,20 +303,20 @@ impl<T: Real> StartProblem<T> {
         motion: &mut Motion<T>,
     ) -> Result<Option<StartImpact<T>>> {
         let rates = start.rates(motion.t, motion)?;
-        let mut problem = Rubbing::default();
+        let mut problem = JumpProblem::default();
         let rigid: Vec<usize> = self.rows.iter().copied().filter(|&row| self.compliance[row] == T::zero()).collect();
         for row in rigid {
             let (block, own) = self.block(start, row);
             if row != contact {
-                problem.push(&block);
+                problem.add_block(&block);
             }
             for k in std::iter::once(row).chain(own) {
                 if row == contact {
-                    problem.push(&Block::new(k, 0, AdmissibleSet::Free));
+                    problem.add_block(&Block::new(k, 0, AdmissibleSet::Free));
                 }
                 let (own, g) = (rates[k].rate, &start.g);
                 let noise = rounding(g.magnitude(k, &motion.v) + own.abs());
-                problem.demand(k, g.product(k, &motion.v) + own, noise, T::zero());
+                problem.add_row(k, g.product(k, &motion.v) + own, noise, T::zero());
             }
         }
         let Start { constraints, g, projection, contact_solver, .. } = start;

@@ -107,7 +107,7 @@ impl<T: Real> Simulation<'_, T> {
                 g,
                 forces: work.contact.rows.curved.forces(g),
                 load,
-                closed: &work.correction.buffers.closed,
+                closed: &work.correction.buffers.rows.closed,
                 closed_at_start: &work.contact.closed_at_start,
                 is_corrected: parts.correctors.iter().any(|corrector| !corrector.effects().corrects_massless),
                 corrections: work.correction.energy,

@@ -1,6 +1,8 @@
 //! The stages of a step. Each stage is predicted, solved with its contact, completed and corrected.
 
-use crate::corrector::{Backup, Correction, Corrector, Erased, ErasedGaps, JumpProjection, Prediction, Scheme};
+use crate::corrector::{
+    Before, Bodies, Correction, Corrector, Erased, ErasedGaps, JumpProjection, Past, Prediction, Scheme,
+};
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::build::program::CompiledStage;
@@ -9,6 +11,7 @@ use crate::simulation::run::{Parts, Simulation};
 use crate::simulation::stage::contact::closing::Booking;
 use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::{Host, StageSolve};
+use crate::state::Backup;
 use crate::tableau::impulse_weight;
 
 impl<T: Real> Simulation<'_, T> {
@@ -42,21 +45,13 @@ impl<T: Real> Simulation<'_, T> {
                 vectors: &mut work.vectors,
                 contact: &mut work.contact,
             };
-            let Workspace { correction, excess, massless, newton, block, backup, .. } = work;
+            let Workspace { correction, massless, newton, block, backup, .. } = work;
 
             solve.predict()?;
             predict_corrections(&mut solve, correction, correctors, massless, place == 0)?;
-            if let Some(excess) = excess {
-                excess.begin(place == 0);
-                excess.shift(stage, clock.h, solve.new);
-            }
             solve.contact.rows.read_start(solve.constraints, solve.g, solve.past, clock.h)?;
 
             solve.solve(newton.as_deref_mut(), block.as_mut())?;
-            if let (Some(excess), Some(projection)) = (&mut *excess, &mut correction.projection) {
-                let switching = &mut *correction.buffers.switching;
-                correction.energy += excess.solve_again(&mut solve, switching, projection)?;
-            }
 
             solve.set_support_accelerations();
             solve.set_massless_rates(place, history.made_with, &history.slopes);
@@ -67,11 +62,8 @@ impl<T: Real> Simulation<'_, T> {
             let impulse_weight = impulse_weight(stage.response, covector);
             let booking = Booking { impulse_weight, is_first: place == 0, is_last: place + 1 == stages };
             solve.close(&booking, &mut correction.buffers)?;
-            if let Some(excess) = excess {
-                excess.book(stage, clock.h, &correction.buffers.switching, &mut solve.contact.trial);
-            }
 
-            let scheme = numbers(stage, covector, [place, stages]);
+            let scheme = numbers(stage, clock.h, covector, [place, stages]);
             correct(solve, scheme, correctors, Corrected { correction, block: block.as_mut(), massless, backup })?;
         }
         Ok(())
@@ -86,31 +78,27 @@ fn predict_corrections<T: Real>(
     massless: &[usize],
     is_first: bool,
 ) -> Result<()> {
-    let CorrectionWork { buffers, projection, projected_rows, shifted, .. } = work;
+    let CorrectionWork { buffers, projection, projected_rows, .. } = work;
     let (Some(projection), Some(start)) = (projection, solve.past.first()) else { return Ok(()) };
     refresh(projection, projected_rows, solve.constraints.version());
     buffers.begin(&solve.contact.trial, is_first);
-    if shifted.is_empty() {
+    if buffers.shifted.is_empty() {
         return Ok(());
     }
     let StageSolve { stage, clock, constraints, g, solver, new, vectors, contact, .. } = solve;
     let mut prediction = Prediction {
         h: clock.h * stage.end,
-        t: new.t,
-        balance_share: balance_share(stage),
         g,
         projection,
         solver: &mut **solver,
         constraints: ErasedGaps(&mut **constraints),
         start,
         new,
-        balance: vectors.balance.as_mut().filter(|_| stage.balance.is_some()),
-        was_closed: &contact.trial.closed,
+        balance: vectors.balance.as_mut().filter(|_| stage.balance.is_some()).map(|at| (balance_share(stage), at)),
+        contacts: &contact.trial,
         massless,
         prescribed: &vectors.supports.dofs,
-        ids: &contact.trial.ids,
         buffers,
-        shifted,
     };
     correctors.iter().try_for_each(|corrector| corrector.predict(&mut prediction))
 }
@@ -131,30 +119,31 @@ fn correct<T: Real>(
     corrected: Corrected<'_, T>,
 ) -> Result<()> {
     let Corrected { correction, block, massless, backup } = corrected;
-    let StageSolve { clock, host, operator, constraints, g, solver, new, past, vectors, contact, .. } = solve;
+    let StageSolve { host, operator, constraints, g, solver, new, past, vectors, contact, .. } = solve;
     let CorrectionWork { buffers, projection, projected_rows, energy, .. } = correction;
     if let Some(projection) = projection.as_mut().filter(|_| buffers.has_touched()) {
         refresh(projection, projected_rows, constraints.version());
         let mut correction = Correction {
-            h: clock.h,
-            t: new.t,
             scheme,
             g,
             projection,
-            operator,
-            block,
+            bodies: Bodies {
+                system: Erased(host.system),
+                operator,
+                block,
+                massless,
+                prescribed: &vectors.supports.dofs,
+            },
             solver,
-            system: Erased(host.system),
             constraints: ErasedGaps(constraints),
             new,
-            past,
-            backup,
+            past: Past { states: past, backup },
             contacts: &mut contact.trial,
-            was_closed: &contact.was_closed,
-            closed_at_start: &contact.closed_at_start,
-            was_sticking: &contact.was_sticking,
-            massless,
-            prescribed: &vectors.supports.dofs,
+            before: Before {
+                closed: &contact.was_closed,
+                closed_at_start: &contact.closed_at_start,
+                sticking: &contact.was_sticking,
+            },
             buffers,
             energy,
         };
@@ -181,10 +170,12 @@ fn balance_share<T: Real>(stage: &CompiledStage<T>) -> T {
 /// The numbers of a stage that a correction needs; the stage is number `place` of `stages`.
 fn numbers<'s, T: Real>(
     stage: &'s CompiledStage<T>,
+    h: f64,
     covector: &'s [[f64; 3]],
     [place, stages]: [usize; 2],
 ) -> Scheme<'s> {
     Scheme {
+        h,
         response: stage.response,
         acceleration: stage.acceleration,
         balance: stage.balance_acceleration,

@@ -103,17 +103,17 @@ impl<T: Real> Impacts<T> {
             projection.solve(changes);
             works.impacts = T::of(0.5) * changes.iter().zip(&*sums).map(|(&impulse, &sum)| impulse * sum).sum::<T>();
         }
-        let way = |row| forces.row(row).map(|(dof, weight)| weight * (u[dof] - from[dof])).sum::<T>();
+        let displacement = |row| forces.row(row).map(|(dof, weight)| weight * (u[dof] - from[dof])).sum::<T>();
         for &row in closed {
             let force = |row: usize| self.forces[row] + newest * (lambda[row] - self.forces[row]);
             let change = contacts.gap[row] - self.gaps[row];
             works.contact -= force(row) * change;
             // Corrected forces do not contain the impulse of the impact.
             if is_corrected && !closed_at_start[row] {
-                works.contact += (contacts.impulse[row] / T::of(h) - force(row)) * (way(row) - change);
+                works.contact += (contacts.impulse[row] / T::of(h) - force(row)) * (displacement(row) - change);
                 for k in constraints.tangents().of(row) {
                     let mean = T::of(0.5) * (self.rates[k] + g.product(k, v));
-                    works.friction += contacts.impulse[k] * mean - force(k) * way(k);
+                    works.friction += contacts.impulse[k] * mean - force(k) * displacement(k);
                 }
             }
         }

@@ -31,9 +31,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
         was_closed.extend_from_slice(&trial.closed);
         was_sticking.clear();
         was_sticking.extend(trial.sliding.iter().zip(&trial.closed).map(|(&slides, &closed)| closed && !slides));
-        buffers.closed.clear();
-        buffers.opened.clear();
-        buffers.released.clear();
+        buffers.rows.closed.clear();
+        buffers.rows.opened.clear();
+        buffers.rows.released.clear();
         trial.lambda.copy_from_slice(&trial.lambda_raw);
         trial.lambda_v.fill(T::zero());
         trial.lambda_a.fill(T::zero());
@@ -57,17 +57,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             if !law.is_compliant() && has_mass {
                 match (closed, was_closed) {
-                    (true, _) => buffers.closed.push(row),
-                    (false, true) => buffers.opened.push(row),
+                    (true, _) => buffers.rows.closed.push(row),
+                    (false, true) => buffers.rows.opened.push(row),
                     (false, false) => {}
                 }
                 if booking.is_last && !closed && (was_closed || closed_at_start[row]) {
-                    buffers.released.push(row);
+                    buffers.rows.released.push(row);
                 }
             }
             let is_balanced = law == ContactLaw::Rigid && buffers.switching.is_on() && is_static;
             if is_balanced {
-                buffers.switching.note(row, trial);
+                buffers.switching.record(row, trial);
             }
             // A contact on dofs without mass may return dissipated energy when it opens, or closes again.
             if closed && !was_closed && !closed_at_start[row] && !is_balanced {

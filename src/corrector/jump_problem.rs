@@ -1,16 +1,18 @@
-//! The contact problem of S = G M⁻¹ Gᵀ with friction, in total multipliers: the jumps already contain a part of them.
+//! The contact problem of S = G M⁻¹ Gᵀ in total multipliers: the jumps already contain a part of them.
 
 use super::JumpProjection;
 use crate::contact::{ContactId, ContactJacobian};
-use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, contact_error};
+use crate::contact_solver::{
+    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, contact_error, no_response,
+};
 use crate::dense::DenseCholesky;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{half_digits, rounding};
 
 /// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
 pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
-    friction >= T::of(1.0 - 1e-8).min(T::one() - T::of(8.0) * T::epsilon()) * bound.max(T::zero())
+    friction >= (T::one() - half_digits::<T>()) * bound.max(T::zero())
 }
 
 /// A contact of the problem.
@@ -27,7 +29,7 @@ pub(crate) struct Block<T> {
     pub(crate) compliance: T,
     /// The normal multiplier if it is known; its effect is then contained in the jumps.
     pub(crate) known: Option<T>,
-    /// Start of its rows in the lists of the problem, set by `push`.
+    /// Start of its rows in the lists of the problem, set by `add_block`.
     pub(crate) place: usize,
 }
 
@@ -35,6 +37,12 @@ impl<T: Real> Block<T> {
     /// A contact with so many tangential rows.
     pub(crate) fn new(row: usize, tangents: usize, set: AdmissibleSet) -> Self {
         Self { row, tangents, set, direction: None, compliance: T::zero(), known: None, place: 0 }
+    }
+
+    /// Whether it is a single equation, whose multiplier may have any sign and size.
+    fn is_equation(&self) -> bool {
+        let Self { tangents, set, direction, compliance, known, .. } = *self;
+        tangents == 0 && set == AdmissibleSet::Free && direction.is_none() && compliance == T::zero() && known.is_none()
     }
 
     /// The range of its rows in the lists of the problem.
@@ -45,7 +53,7 @@ impl<T: Real> Block<T> {
 
 /// The problem and its memory: blocks, and lists with one entry per row, block after block.
 #[derive(Debug, Default)]
-pub(crate) struct Rubbing<T> {
+pub(crate) struct JumpProblem<T> {
     pub(super) blocks: Vec<Block<T>>,
     /// The rows, and the block of each.
     pub(crate) rows: Vec<usize>,
@@ -64,15 +72,6 @@ pub(crate) struct Rubbing<T> {
     /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
     directions: Vec<(usize, [T; 2])>,
     group: Group<T>,
-}
-
-/// How the friction of sliding contacts enters a problem.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Friction {
-    /// Proportional to the unknown normal multiplier.
-    Follows,
-    /// Fixed at its value in the totals; also used if nothing slides.
-    Lags,
 }
 
 /// Rows that S couples, as a problem for a contact solver.
@@ -94,7 +93,21 @@ struct Group<T> {
 
 type Solved<T> = std::result::Result<(), ContactFailure<T>>;
 
-impl<T: Real> Rubbing<T> {
+impl<T: Real> JumpProblem<T> {
+    /// Reserves memory for this many rows, and for groups of up to `FORESEEN` of them.
+    pub(super) fn make_room(&mut self, rows: usize) {
+        let Self { blocks, rows: own, owners, jump, tolerance, base, totals, increments, left, noise, group, .. } =
+            self;
+        blocks.reserve(rows.saturating_sub(blocks.len()));
+        for list in [own, owners] {
+            list.reserve(rows.saturating_sub(list.len()));
+        }
+        for values in [jump, tolerance, base, totals, increments, left, noise] {
+            values.reserve(rows.saturating_sub(values.len()));
+        }
+        group.make_room(rows.min(FORESEEN));
+    }
+
     /// Removes all blocks.
     pub(crate) fn clear(&mut self) {
         let Self { blocks, rows, owners, jump, tolerance, base, totals, increments, left, noise, .. } = self;
@@ -106,14 +119,14 @@ impl<T: Real> Rubbing<T> {
         }
     }
 
-    /// Appends a contact. Its rows must be [appended](Self::demand) next: first the normal row, then the tangential
+    /// Appends a contact. Its rows must be [appended](Self::add_row) next: first the normal row, then the tangential
     /// ones.
-    pub(crate) fn push(&mut self, block: &Block<T>) {
+    pub(crate) fn add_block(&mut self, block: &Block<T>) {
         self.blocks.push(Block { place: self.rows.len(), ..*block });
     }
 
     /// Appends a row: its jump, the rounding error of the jump, and the multiplier that the jump contains.
-    pub(crate) fn demand(&mut self, row: usize, jump: T, tolerance: T, base: T) {
+    pub(crate) fn add_row(&mut self, row: usize, jump: T, tolerance: T, base: T) {
         self.rows.push(row);
         self.owners.push(self.blocks.len().saturating_sub(1));
         self.jump.push(jump);
@@ -161,6 +174,9 @@ impl<T: Real> Rubbing<T> {
             values.clear();
             values.resize(self.rows.len(), T::zero());
         }
+        if self.blocks.iter().all(Block::is_equation) {
+            return self.solve_equations(g, projection, |row| no_response(t, id(row)));
+        }
         projection.sort(g, &self.rows);
         let mut group = std::mem::take(&mut self.group);
         let mut result = Ok(());
@@ -185,6 +201,23 @@ impl<T: Real> Rubbing<T> {
         result
     }
 
+    /// Solves equations alone. The projection keeps its factor of S while their rows stay the same.
+    fn solve_equations(
+        &mut self,
+        g: &ContactJacobian<T>,
+        projection: &mut JumpProjection<T>,
+        refuse: impl Fn(usize) -> Error,
+    ) -> Result<()> {
+        projection.close_rows(g, &self.rows, refuse)?;
+        self.increments.clear();
+        self.increments.extend(self.jump.iter().map(|&jump| -jump));
+        projection.solve(&mut self.increments);
+        for ((total, &base), &increment) in self.totals.iter_mut().zip(&self.base).zip(&self.increments) {
+            *total = base + increment;
+        }
+        Ok(())
+    }
+
     /// Solves for the rows at these positions. A sliding contact whose multiplier would pull gets no friction, and
     /// the problem is solved again.
     fn solve_group(
@@ -195,15 +228,10 @@ impl<T: Real> Rubbing<T> {
         presses: T,
     ) -> Solved<T> {
         loop {
-            let follows = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
-            let friction = if follows { Friction::Follows } else { Friction::Lags };
-            group.pose(self, positions, friction);
-            if let Err(failure) = group.solve(solver, friction) {
-                return match group.jammed(self, positions) {
-                    Some(jammed) => Err(jammed),
-                    None if follows => self.solve_lagging(positions, group, solver, presses).map_err(|_| failure),
-                    None => Err(failure),
-                };
+            let slides = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
+            group.pose(self, positions);
+            if let Err(failure) = group.solve(solver, !slides) {
+                return Err(group.jammed(self, positions).unwrap_or(failure));
             }
             let mut again = false;
             for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
@@ -237,80 +265,12 @@ impl<T: Real> Rubbing<T> {
             let bound = T::of(friction) * (presses * self.totals[position]).max(T::zero());
             let tangential = &mut self.totals[position + 1..=position + block.tangents];
             let size = tangential.iter().fold(T::zero(), |size, &f| size.hypot(f));
-            if size > (T::one() + T::epsilon().sqrt()) * bound {
+            if size > (T::one() + half_digits::<T>()) * bound {
                 for f in tangential {
                     *f *= bound / size;
                 }
             }
         }
-    }
-
-    /// Solves by iteration with lagged friction if the equations with following friction have no solution because a
-    /// sliding contact would pull. Each iteration fixes the friction of sliding contacts and solves for the others.
-    fn solve_lagging(
-        &mut self,
-        positions: &[usize],
-        group: &mut Group<T>,
-        solver: &mut dyn ContactSolver<T>,
-        presses: T,
-    ) -> Solved<T> {
-        /// Largest number of iterations, each relaxed by one half. The error after the last one is accepted: the
-        /// reported friction is in its cone, and the remaining jump is a jump of accelerations.
-        const PASSES: usize = 60;
-        /// Growth of the change per iteration that counts as divergence. It may occur with nearly equal rows, of
-        /// which one pulls while the other presses. Sliding contacts then get no friction.
-        const DIVERGES: f64 = 1e2;
-        let half = T::of(0.5);
-        for &position in positions {
-            self.totals[position] = T::zero();
-        }
-        let (mut least, mut diverges) = (T::infinity(), false);
-        for _ in 0..PASSES {
-            group.pose(self, positions, Friction::Lags);
-            group.solve(solver, Friction::Lags)?;
-            let (mut change, mut largest) = (T::zero(), T::zero());
-            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
-                let position = positions[at];
-                let block = &self.blocks[self.owners[position]];
-                self.totals[position] = multiplier;
-                for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
-                    let pressing = presses * (presses * multiplier).max(T::zero());
-                    let friction = &mut self.totals[position + 1 + k];
-                    let moved = half * (along * pressing - *friction);
-                    *friction += moved;
-                    (change, largest) = (change.max(moved.abs()), largest.max(friction.abs()));
-                }
-            }
-            if change <= T::of(1e-12).max(T::of(8.0) * T::epsilon()) * largest {
-                break;
-            }
-            least = least.min(change);
-            diverges = change > T::of(DIVERGES) * least || !change.is_finite();
-            if diverges {
-                break;
-            }
-        }
-        if diverges {
-            for &position in positions {
-                self.totals[position] = T::zero();
-            }
-            group.pose(self, positions, Friction::Lags);
-            group.solve(solver, Friction::Lags)?;
-            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
-                self.totals[positions[at]] = multiplier;
-            }
-            self.measure(positions, group);
-            return Ok(());
-        }
-        for &at in &group.unknowns {
-            let (position, block) = (positions[at], &self.blocks[self.owners[positions[at]]]);
-            let pressing = presses * (presses * self.totals[position]).max(T::zero());
-            for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
-                self.totals[position + 1 + k] = along * pressing;
-            }
-        }
-        self.measure(positions, group);
-        Ok(())
     }
 
     /// Computes the remaining jumps of a group.
@@ -329,13 +289,32 @@ impl<T: Real> Rubbing<T> {
 }
 
 impl<T: Real> Group<T> {
+    /// Reserves memory for this many rows.
+    fn make_room(&mut self, rows: usize) {
+        self.reserve_factor(rows);
+        let Self { rows: own, s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
+        for list in [own, unknowns] {
+            list.reserve(rows.saturating_sub(list.len()));
+        }
+        for matrix in [s, delassus] {
+            matrix.reserve((rows * rows).saturating_sub(matrix.len()));
+        }
+        for values in [offset, tolerance, multipliers] {
+            values.reserve(rows.saturating_sub(values.len()));
+        }
+        sets.reserve(rows.saturating_sub(sets.len()));
+    }
+
+    fn reserve_factor(&mut self, rows: usize) {
+        if rows > self.reserved {
+            (self.factor, self.reserved) = (DenseCholesky::with_capacity(rows), rows);
+        }
+    }
+
     /// Sets up the problem of the rows at these positions, with S given: one unknown per row, but a single unknown
     /// per sliding contact, whose friction is proportional to the normal multiplier.
-    fn pose(&mut self, all: &Rubbing<T>, positions: &[usize], friction: Friction) {
+    fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize]) {
         let size = positions.len();
-        if size > self.reserved {
-            (self.factor, self.reserved) = (DenseCholesky::with_capacity(size), size);
-        }
         let Self { s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
         let block = |at: usize| &all.blocks[all.owners[positions[at]]];
         for values in [&mut *delassus, offset, tolerance, multipliers] {
@@ -368,17 +347,15 @@ impl<T: Real> Group<T> {
             }
             let (mut contained, mut terms) = (T::zero(), T::zero());
             for (j, &position) in positions.iter().enumerate() {
-                let lags = friction == Friction::Lags && block(j).direction.is_some() && block(j).place < position;
-                let base = all.base[position] - if lags { all.totals[position] } else { T::zero() };
-                contained += entry(j) * base;
-                terms += (entry(j) * base).abs();
+                contained += entry(j) * all.base[position];
+                terms += (entry(j) * all.base[position]).abs();
             }
             offset.push(all.jump[positions[i]] - contained);
             tolerance.push(all.tolerance[positions[i]] + rounding(terms));
             for &j in unknowns.iter() {
                 let Block { tangents, direction, compliance, place, .. } = *block(j);
                 let mut sum = if known(j).is_some() { T::zero() } else { entry(j) };
-                if let Some(direction) = direction.filter(|_| friction == Friction::Follows) {
+                if let Some(direction) = direction {
                     sum += (0..tangents).map(|k| direction[k] * entry(j + 1 + k)).sum::<T>();
                 }
                 delassus.push(if i == j && positions[j] == place { sum + compliance } else { sum });
@@ -389,10 +366,11 @@ impl<T: Real> Group<T> {
 
     /// Solves the problem. Equations alone, with a symmetric W, are solved in the least norm, however rounding has
     /// changed dependent rows.
-    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
-        let Self { delassus, offset, sets, tolerance, multipliers, factor, .. } = self;
-        let size = offset.len();
-        if friction == Friction::Lags && sets.iter().all(|&set| set == AdmissibleSet::Free) {
+    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, is_symmetric: bool) -> Solved<T> {
+        let size = self.offset.len();
+        if is_symmetric && self.sets.iter().all(|&set| set == AdmissibleSet::Free) {
+            self.reserve_factor(size);
+            let Self { delassus, offset, multipliers, factor, .. } = self;
             let failure = |row| ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() };
             factor.factorize(size, |i, j| delassus[i * size + j]).map_err(failure)?;
             for (multiplier, &offset) in multipliers.iter_mut().zip(offset.iter()) {
@@ -401,11 +379,12 @@ impl<T: Real> Group<T> {
             factor.solve(multipliers);
             return Ok(());
         }
+        let Self { delassus, offset, sets, tolerance, multipliers, .. } = self;
         solver.solve(&ContactProblem::of(delassus, offset, sets, tolerance, 0), multipliers).map(|_| ())
     }
 
     /// A sliding contact that friction jams.
-    fn jammed(&self, all: &Rubbing<T>, positions: &[usize]) -> Option<ContactFailure<T>> {
+    fn jammed(&self, all: &JumpProblem<T>, positions: &[usize]) -> Option<ContactFailure<T>> {
         let (size, unknowns) = (positions.len(), self.unknowns.len());
         let one = |(row, &at): (usize, &usize)| {
             let [x, y] = all.blocks[all.owners[positions[at]]].direction?;
