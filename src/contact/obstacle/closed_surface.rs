@@ -2,9 +2,10 @@
 
 use super::{Obstacle, dot};
 use crate::contact::Facet;
-use crate::contact::surface::{Foot, Location, Point, Shape, Surface};
+use crate::contact::surface::{Bounds, Foot, Location, Point, Shape, Surface};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
+use crate::rounding::{root_of_rounding, rounding};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{ParentNode, RTree, RTreeNode, RTreeObject};
 use std::collections::HashMap;
@@ -88,7 +89,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         let surface = Surface::of_facets(facets, D, &positions)?;
         check(&surface, &positions)?;
         let leaf = |(index, facet): (usize, &Facet)| {
-            let [lower, upper] = facet.shape(&positions).bounds();
+            let Bounds { lower, upper } = Bounds::of_corners(&facet.shape(&positions));
             GeomWithData::new(Rectangle::from_corners(lower, upper), index)
         };
         let tree = RTree::bulk_load(surface.facets().iter().enumerate().map(leaf).collect());
@@ -132,7 +133,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         for child in order.filter_map(|k| children.get(k)) {
             let limit = best.map_or(f64::INFINITY, |best| best.projected.1.distance);
             // Both sides are rounded.
-            if away(child) > limit * limit * (1.0 + 16.0 * f64::EPSILON) {
+            if away(child) > limit * limit * (1.0 + rounding(1.0)) {
                 continue;
             }
             match child {
@@ -155,8 +156,8 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
 
     /// The normal, and the signed distance from the surface without the rounding.
     fn direction(&self, p: Point, nearest: &Nearest) -> Option<(Point, f64)> {
-        let rounding = f64::EPSILON.sqrt();
-        self.surface.direction(nearest.facet, p, &nearest.projected, (rounding, &|_| true), &self.positions)
+        let touching = root_of_rounding();
+        self.surface.direction(nearest.facet, p, &nearest.projected, (touching, &|_| true), &self.positions)
     }
 }
 
@@ -198,7 +199,7 @@ impl<T: Real, const D: usize> Obstacle<T, D> for ClosedSurface<T, D> {
         let Some(nearest) = self.nearest(p) else { return T::nan() };
         let Some((normal, distance)) = self.direction(p, &nearest) else { return T::nan() };
         let (shape, foot) = &nearest.projected;
-        if foot.distance <= f64::EPSILON.sqrt() * shape.size() {
+        if foot.distance <= root_of_rounding::<f64>() * shape.size() {
             return T::zero();
         }
         // Around an edge or a vertex the normal turns with the velocity across it.
