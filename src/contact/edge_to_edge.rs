@@ -323,10 +323,10 @@ impl<'a> Sides<'a> {
     /// A pair of edges, unless it is excluded: for a surface against itself each pair counts once, and edges with
     /// facets near each other on the surface do not count.
     fn meeting(&self, [first, second]: [usize; 2]) -> Option<Pair<'a>> {
-        let apart = self.vicinity.kin.as_ref().is_none_or(|kin| {
+        let apart = self.vicinity.own_facets.as_ref().is_none_or(|own| {
             let keeps = |one: &Edge, other: &Edge| {
                 let places = one.nodes.map(|node| self.surfaces[0].place(node));
-                other.facets().iter().any(|&facet| places.iter().any(|&place| kin.keeps_apart(place, facet)))
+                other.facets().iter().any(|&facet| places.iter().any(|&place| own.adjacent.holds(place, facet)))
             };
             let [one, other] = [&self.edges[0][first], &self.edges[1][second]];
             first < second && !keeps(one, other) && !keeps(other, one)

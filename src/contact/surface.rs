@@ -1,12 +1,12 @@
 //! A surface of facets: its facets and nodes, their neighbors, and closest points.
 
 mod closed;
+mod closest_point;
 mod cones;
 mod connect;
 mod dent;
 mod exact;
 mod facet;
-mod kin;
 mod material;
 mod nearest_first;
 mod nodes;
@@ -15,6 +15,7 @@ mod offsets;
 mod outer;
 mod output;
 mod overlap;
+mod own_facets;
 mod polygon;
 mod projection;
 mod ramp;
@@ -24,7 +25,6 @@ mod second_difference;
 mod second_order;
 mod shape;
 mod sharp;
-mod slide;
 mod vicinity;
 
 pub(crate) use cones::Cones;
@@ -160,23 +160,8 @@ impl Surface {
         beyond: f64,
         positions: &[Point],
     ) -> Option<(Shape, Foot)> {
-        self.project_within(facet, p, Rim { beyond, ..self.rims[facet] }, positions)
-    }
-
-    /// As `project`, on a facet extended beyond all of its sides by `beyond` times its size.
-    pub(crate) fn project_on_plane(
-        &self,
-        facet: usize,
-        p: Point,
-        beyond: f64,
-        positions: &[Point],
-    ) -> Option<(Shape, Foot)> {
-        self.project_within(facet, p, Rim { sides: [true; 4], vertices: [true; 4], beyond }, positions)
-    }
-
-    fn project_within(&self, facet: usize, p: Point, rim: Rim, positions: &[Point]) -> Option<(Shape, Foot)> {
         let shape = self.facets[facet].shape(positions);
-        shape.project(p, rim).map(|foot| (shape, foot))
+        shape.project(p, Rim { beyond, ..self.rims[facet] }).map(|foot| (shape, foot))
     }
 
     /// The facets around a node, with the vertex of each that is this node; none if the node is not on the surface.

@@ -1,6 +1,7 @@
 //! The edges of a surface: convex sides between facets that turn, and the normals of the body there.
 
 use crate::contact::surface::{Bounds, Facet, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
+use crate::rounding::ROUNDED_SHARE;
 
 /// A side that two facets share.
 #[derive(Clone, Copy, Debug)]
@@ -21,12 +22,6 @@ struct Wedge {
 }
 
 impl Wedge {
-    /// Angle by which the surface turns around the edge: positive where it is convex.
-    fn turn(&self) -> f64 {
-        let [left, right] = self.normals;
-        dot(self.along, cross(left, right)).atan2(dot(left, right))
-    }
-
     /// Sine of the angle by which a normal across the edge lies outside the range of normals between the two facets;
     /// 1 if it points the other way, or if the edge is not convex.
     fn miss(&self, normal: Point) -> f64 {
@@ -53,10 +48,8 @@ impl Edge {
                 let second = nodes[(side + 1) % nodes.len()];
                 let Some(across) = surface.neighbor(facet, side).filter(|_| first < second) else { continue };
                 let length = norm(sub(coordinates[second], coordinates[first]));
-                let edge = Self { nodes: [first, second], length, sides: [(facet, side), across] };
-                let wedge = edge.wedge(0.5, surface, &|node| coordinates[node]);
-                if wedge.is_some_and(|wedge| wedge.turn() > angle) {
-                    edges.push(edge);
+                if surface.turn(facet, side, coordinates).is_some_and(|turn| turn > angle) {
+                    edges.push(Self { nodes: [first, second], length, sides: [(facet, side), across] });
                 }
             }
         }
@@ -104,8 +97,7 @@ impl Edge {
 
     /// Whether the reversed normal points into the body at a share of the edge.
     pub(super) fn is_behind(&self, normal: Point, share: f64, surface: &Surface, at: &impl Fn(usize) -> Point) -> bool {
-        const ROUNDING: f64 = 1e-9;
-        self.wedge(share, surface, at).is_some_and(|wedge| wedge.holds_behind(normal, ROUNDING))
+        self.wedge(share, surface, at).is_some_and(|wedge| wedge.holds_behind(normal, ROUNDED_SHARE))
     }
 
     /// The point at a share of the edge between these ends.

@@ -1,6 +1,7 @@
 //! Two straight edges: the closest points of the lines through them, their distance, and when moving ones meet.
 
 use crate::contact::surface::{Point, add_scaled, cross, dot, norm, sub};
+use crate::rounding::ROUNDED_SHARE;
 
 /// The two ends of an edge, or their velocities.
 pub(super) type Ends = [Point; 2];
@@ -21,12 +22,11 @@ pub(super) struct Crossing {
 impl Crossing {
     /// The closest points of two lines; none if one has no length, or if they are parallel up to rounding.
     pub(super) fn of([e, f]: [Ends; 2]) -> Option<Self> {
-        const ROUNDING: f64 = 1e-12;
         let (along, other) = (sub(e[1], e[0]), sub(f[1], f[0]));
         let (across, between) = (cross(along, other), sub(e[0], f[0]));
         let square = dot(across, across);
         let sine = square.sqrt() / (norm(along) * norm(other));
-        if sine.is_nan() || sine <= ROUNDING {
+        if sine.is_nan() || sine <= ROUNDED_SHARE {
             return None;
         }
         let shares = [dot(cross(other, between), across) / square, dot(cross(along, between), across) / square];
@@ -70,30 +70,6 @@ impl Crossing {
         let turned = [-by_first, by_first, -by_second, by_second];
         let weights = self.weights();
         [0, 1, 2, 3].map(|k| add_scaled(moved.map(|x| weights[k] * x), turned[k], apart))
-    }
-
-    /// d²g/dτ² of two edges whose ends move in straight lines, at velocities `v`.
-    ///
-    /// With N = t_e × t_f and r from any point of the second line to any point of the first that move with the edges,
-    /// g = r·N/|N|. With the closest points, r = g n avoids differences of long vectors.
-    pub(super) fn acceleration(&self, [e, f]: [Ends; 2], [v, w]: [Ends; 2]) -> f64 {
-        let ([along, other], [turn, twist]) = ([e, f].map(|x| sub(x[1], x[0])), [v, w].map(|x| sub(x[1], x[0])));
-        let point = |ends: Ends, share: f64, turn: Point| add_scaled(ends[0], share, turn);
-        let speed = sub(point(v, self.shares[0], turn), point(w, self.shares[1], twist));
-        let (apart, across) = (self.normal.map(|x| self.gap * x), cross(along, other));
-        // g has the sign of the normal, which may be opposite to N.
-        let sign = if dot(self.normal, across) < 0.0 { -1.0 } else { 1.0 };
-        let first = add_scaled(cross(turn, other), 1.0, cross(along, twist));
-        let second = cross(turn, twist).map(|x| 2.0 * x);
-        let size = norm(across);
-        let triple = [dot(apart, across), dot(speed, across) + dot(apart, first)];
-        let triple_second = 2.0 * dot(speed, first) + dot(apart, second);
-        let growth = dot(across, first) / size;
-        let growth_second = (dot(first, first) + dot(across, second) - growth * growth) / size;
-        let [value, rate] = triple;
-        let quotient = triple_second - 2.0 * rate * growth / size - value * growth_second / size
-            + 2.0 * value * growth * growth / (size * size);
-        sign * quotient / size
     }
 }
 
@@ -194,23 +170,6 @@ mod tests {
                     }
                 }
             }
-        }
-    }
-
-    #[test]
-    fn the_second_derivative_is_that_of_differences() {
-        let e = [[-0.7, 0.1, 0.3], [0.9, -0.2, 0.4]];
-        let f = [[0.1, -1.2, 0.0], [-0.2, 0.8, 0.1]];
-        let v = [[0.3, -0.8, 0.2], [-0.5, 0.4, 0.7]];
-        let w = [[-0.1, 0.2, 0.9], [0.6, -0.3, -0.4]];
-        let ways = Ways::new([e, f], [v, w]);
-        let gap = |time: f64| Crossing::of(ways.at(time)).unwrap().gap;
-        let step = 1e-4;
-        let difference = (gap(step) - 2.0 * gap(0.0) + gap(-step)) / (step * step);
-        let crossing = Crossing::of([e, f]).unwrap();
-        for seen in [(crossing, 1.0), (crossing.turned(), -1.0)] {
-            let found = seen.1 * seen.0.acceleration([e, f], [v, w]);
-            assert!((found - difference).abs() < 1e-6, "{found} {difference}");
         }
     }
 }

@@ -3,17 +3,12 @@
 use super::edges::Edge;
 use super::lines::{Crossing, Ways};
 use crate::contact::surface::{Bounds, Offsets, Point, RECOVERY, Surface, add_scaled, dot, sub};
+use crate::rounding::{NEAR_SHARE, ROUNDED_SHARE, half_digits};
 
 /// Sine of the smallest angle between two edges with a row. If edges cross between nodes at an angle φ, nodes on
 /// facets let them penetrate by at most half an edge times sin φ: here by 2.5 % of an edge. The normal of two edges
 /// at an angle φ turns 1/sin φ times as fast as the edges.
 pub(super) const LEAST_SINE: f64 = 0.05;
-
-/// Shares of an edge, and sines, below which a value is rounding.
-const ROUNDING: f64 = 1e-9;
-
-/// Depth, as a share of the shorter edge, up to which a pair is kept for any shape of the bodies behind.
-const SHALLOW: f64 = 1e-3;
 
 /// Gap and distance beyond the ends, as shares of an edge, within which edges touch. Beside a dent they are in
 /// contact then even if the normal lies outside the normals of the facets.
@@ -108,7 +103,7 @@ impl Pair<'_> {
     /// The closest points of edges that meet, oriented so that the gap is positive outside.
     pub(super) fn meeting(&self, at: &impl Fn(usize) -> Point) -> Option<Crossing> {
         let crossing = Crossing::of(self.ends(at)).filter(|crossing| crossing.sine >= LEAST_SINE)?;
-        [crossing, crossing.turned()].into_iter().find(|crossing| self.miss(crossing, at) <= ROUNDING)
+        [crossing, crossing.turned()].into_iter().find(|crossing| self.miss(crossing, at) <= ROUNDED_SHARE)
     }
 
     /// The closest points of edges that meet within a distance of `reach` plus `way`, or that may meet within a step
@@ -130,11 +125,11 @@ impl Pair<'_> {
             let touches = gap.abs() <= TOUCH * shorter && crossing.excess().into_iter().all(|x| x <= TOUCH);
             // Edges that already penetrate must lie in the bodies, and meet; others must approach from outside.
             // Beyond an end the lines of closed edges penetrate by at most the opening of the gap.
-            let on_edges = crossing.excess().into_iter().all(|x| x <= ROUNDING);
-            let meets = || on_edges || gap + self.by_shares(crossing).0 >= -SHALLOW * shorter;
-            let inside = || misses <= ROUNDING && gap >= -deepest && meets() && self.is_inside(crossing, at);
+            let on_edges = crossing.excess().into_iter().all(|x| x <= ROUNDED_SHARE);
+            let meets = || on_edges || gap + self.by_shares(crossing).0 >= -NEAR_SHARE * shorter;
+            let inside = || misses <= ROUNDED_SHARE && gap >= -deepest && meets() && self.is_inside(crossing, at);
             let is_met = misses <= if touches { LARGEST_TURN } else { turn };
-            is_met && crossing.gap >= -self.depth && (touches || gap >= -SHALLOW * shorter || inside())
+            is_met && crossing.gap >= -self.depth && (touches || gap >= -NEAR_SHARE * shorter || inside())
         };
         [crossing, crossing.turned()].into_iter().find(is_near)
     }
@@ -144,17 +139,16 @@ impl Pair<'_> {
         RECOVERY * self.shorter()
     }
 
-    /// The edge beyond whose end the closest points lie, if any, and the opening of the gap with its derivatives by
+    /// The edge beyond whose end the closest points lie, if any, and the opening of the gap with its derivative by
     /// the share of that edge: a x²/(x + w) in lengths of the edge, at the share x beyond the end.
-    fn opening(&self, crossing: &Crossing) -> Option<(usize, [f64; 3])> {
+    fn opening(&self, crossing: &Crossing) -> Option<(usize, [f64; 2])> {
         let excess = crossing.excess();
         let [one, other] = [0, 1].map(|edge| excess[edge] * self.edges[edge].length);
         let edge = usize::from(one < other);
         let (x, w) = (excess[edge], WIDTH);
         let size = STEEP * self.edges[edge].length;
         let outward = if crossing.shares[edge] < 0.0 { -size } else { size };
-        let value = [size * x * x / (x + w), outward * x * (x + 2.0 * w), size * 2.0 * w * w];
-        (x > 0.0).then(|| (edge, [value[0], value[1] / (x + w).powi(2), value[2] / (x + w).powi(3)]))
+        (x > 0.0).then(|| (edge, [size * x * x / (x + w), outward * x * (x + 2.0 * w) / (x + w).powi(2)]))
     }
 
     /// The gap of the edges, and its derivatives with respect to the positions of the four ends. If the closest
@@ -174,7 +168,7 @@ impl Pair<'_> {
     /// edges, from the opening and from the radii.
     fn by_shares(&self, crossing: &Crossing) -> (f64, [f64; 2]) {
         let mut slopes = self.radii().map(|[from, to]| -self.offsets.factor * (to - from));
-        let Some((edge, [opening, slope, _])) = self.opening(crossing) else { return (0.0, slopes) };
+        let Some((edge, [opening, slope])) = self.opening(crossing) else { return (0.0, slopes) };
         slopes[edge] += slope;
         (opening, slopes)
     }
@@ -194,33 +188,25 @@ impl Pair<'_> {
         self.radii().into_iter().enumerate().map(|(edge, radii)| of_edge(edge, radii)).sum()
     }
 
-    /// d²g/dτ² of that gap for straight motions at these velocities, with differences of the shares.
+    /// d²g/dτ² of that gap for straight motions at these velocities, by second differences.
     pub(super) fn acceleration(
         &self,
         crossing: &Crossing,
         at: &impl Fn(usize) -> Point,
         velocity: &impl Fn(usize) -> Point,
     ) -> f64 {
-        const STEP: f64 = 1e-3;
-        let (ends, speeds) = (self.ends(at), self.ends(velocity));
-        let lines = crossing.acceleration(ends, speeds);
         let way = self.way(velocity);
-        let (_, slopes) = self.by_shares(crossing);
-        if slopes.iter().all(|slope| *slope == 0.0) || way == 0.0 {
-            return lines;
+        if way <= 0.0 {
+            return 0.0;
         }
-        let bend = self.opening(crossing).map(|(edge, [.., bend])| (edge, bend));
-        let time = STEP * self.shorter() / way;
-        let ways = Ways::new(ends, speeds);
-        let shares =
-            [-time, 0.0, time].map(|time| Crossing::of(ways.at(time)).map_or(crossing.shares, |then| then.shares));
-        let of_edge = |edge: usize| {
-            let [before, now, after] = shares.map(|shares| shares[edge]);
-            let (first, second) = ((after - before) / (2.0 * time), (after - 2.0 * now + before) / (time * time));
-            let bend = bend.filter(|bend| bend.0 == edge).map_or(0.0, |bend| bend.1);
-            slopes[edge] * second + bend * first * first
+        // A motion by ε^¼ of an edge: rounding and the fourth derivative contribute alike.
+        let time = half_digits::<f64>().sqrt() * self.shorter() / way;
+        let ways = Ways::new(self.ends(at), self.ends(velocity));
+        let gap = |time: f64| {
+            let then = Crossing::of(ways.at(time)).unwrap_or(*crossing).as_seen_along(crossing.normal);
+            self.clear(&then) + self.opening(&then).map_or(0.0, |(_, [opening, _])| opening)
         };
-        lines + of_edge(0) + of_edge(1)
+        (gap(time) - 2.0 * gap(0.0) + gap(-time)) / (time * time)
     }
 }
 

@@ -20,9 +20,7 @@ use super::parts::Parts;
 use super::points::{self, Addends, Column, NORMAL, OTHERS, OWN, Points, column};
 use super::second_order::{Pair, Shares};
 use crate::contact::surface::{Base, Facet, Offsets, Point, RimSample, Sample, Surface, add_scaled, dot};
-
-/// Least covered share of a node's area for a row. A smaller part may be a sliver.
-const LEAST: f64 = 1e-6;
+use crate::rounding::LEAST_COVER;
 
 impl Offsets<'_> {
     /// The offsets at the corners of a slave facet and of a master facet, without the factor.
@@ -90,7 +88,7 @@ impl Sums {
 
     /// Whether the covered part is large enough for a row.
     pub(super) fn is_covered(&self) -> bool {
-        self.area > LEAST * self.whole
+        self.area > LEAST_COVER * self.whole
     }
 
     /// The mean of the gap with the weights of the node.

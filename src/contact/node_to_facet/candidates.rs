@@ -48,7 +48,7 @@ impl<T: Real> NodeToFacet<T> {
         clearance: &mut [f64],
     ) {
         let Self { surface, own_surface, nodes, passes, vicinity, found, cones, .. } = self;
-        let Vicinity { kin, reach, thickness, .. } = &*vicinity;
+        let Vicinity { own_facets, reach, thickness, .. } = &*vicinity;
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
         let surfaces = (&*surface, own_surface.as_ref());
@@ -58,13 +58,13 @@ impl<T: Real> NodeToFacet<T> {
         let ground_of = |pass: usize| {
             let kept = Kept { reach, motion: motions[1 - pass], thick };
             let ground = ground((pass, passes), surfaces, vicinity, places, kept, half_digits::<T>().value())?;
-            let of = |other: usize| if kin.is_some() { Some(&cones[0]) } else { cones.get(other) };
+            let of = |other: usize| if own_facets.is_some() { Some(&cones[0]) } else { cones.get(other) };
             Some(Ground { boxes: Some(&passes[pass].boxes), cones: [of(pass), of(1 - pass)], ..ground })
         };
         let Some(ground) = ground_of(pass) else { return };
         // The pass of the facets' own nodes, if there is one: for two surfaces the other pass.
-        let back = if kin.is_some() { Some((pass, ground)) } else { Some(1 - pass).zip(ground_of(1 - pass)) };
-        let back = back.filter(|_| kin.is_some() || passes.len() > 1);
+        let back = if own_facets.is_some() { Some((pass, ground)) } else { Some(1 - pass).zip(ground_of(1 - pass)) };
+        let back = back.filter(|_| own_facets.is_some() || passes.len() > 1);
         let way_of = |pass: usize, node: usize| {
             growth + ahead * Bounds::of_points([nodes.vector(node, v)]).farthest(&speeds[1 - pass])
         };
@@ -182,6 +182,19 @@ fn ground<'a>(
     let Pass { nodes, lists, .. } = passes.get(pass)?;
     let (surface, own) = if pass == 0 { (surface, own_surface) } else { (own_surface?, Some(surface)) };
     let (lists, kept, cones) = (Some(lists), Some(kept), [None; 2]);
-    let (kin, material) = (vicinity.kin.as_ref(), vicinity.material_of(pass));
-    Some(Ground { nodes, lists, kept, surface, boxes: None, cones, own, kin, material, positions, offsets, rounding })
+    let (own_facets, material) = (vicinity.own_facets.as_ref(), vicinity.material_of(pass));
+    Some(Ground {
+        nodes,
+        lists,
+        kept,
+        surface,
+        boxes: None,
+        cones,
+        own,
+        own_facets,
+        material,
+        positions,
+        offsets,
+        rounding,
+    })
 }

@@ -66,7 +66,7 @@ impl<T: Real> NodeToFacet<T> {
                     boxes: None,
                     cones: [None; 2],
                     own,
-                    kin: self.vicinity.kin.as_ref(),
+                    own_facets: self.vicinity.own_facets.as_ref(),
                     material: self.vicinity.material_of(pass),
                     positions: &ends[k],
                     offsets: self.vicinity.thickness.at(step.t[k]),

@@ -2,7 +2,7 @@
 
 use super::{Obstacle, dot};
 use crate::contact::Facet;
-use crate::contact::surface::{Foot, Location, Point, Shape, Surface};
+use crate::contact::surface::{Bounds, Foot, Location, Point, Shape, Surface};
 use crate::error::{Error, Result, positive};
 use crate::real::Real;
 use crate::rounding::{half_digits, rounding};
@@ -89,7 +89,7 @@ impl<T: Real, const D: usize> ClosedSurface<T, D> {
         let surface = Surface::of_facets(facets, D, &positions)?;
         check(&surface, &positions)?;
         let leaf = |(index, facet): (usize, &Facet)| {
-            let [lower, upper] = facet.shape(&positions).bounds();
+            let Bounds { lower, upper } = Bounds::of_corners(&facet.shape(&positions));
             GeomWithData::new(Rectangle::from_corners(lower, upper), index)
         };
         let tree = RTree::bulk_load(surface.facets().iter().enumerate().map(leaf).collect());

@@ -6,7 +6,12 @@ use super::shape::{Foot, Point, Shape, cross, dot, sub};
 impl Surface {
     /// A facet at which the surface ends.
     pub(crate) fn open_facet(&self) -> Option<usize> {
-        self.rims.iter().zip(&self.facets).position(|(rim, facet)| rim.sides[..facet.nodes().len()].contains(&true))
+        (0..self.facets.len()).find(|&facet| self.is_open(facet))
+    }
+
+    /// Whether the surface ends at a side of a facet.
+    fn is_open(&self, facet: usize) -> bool {
+        self.rims[facet].sides[..self.facets[facet].nodes().len()].contains(&true)
     }
 
     /// A node at which a surface without rim touches itself: the facets around it form several fans.
@@ -61,12 +66,9 @@ impl Surface {
         let mut bodies = self.parts();
         let mut parts: Vec<Vec<usize>> = vec![Vec::new(); bodies.len()];
         bodies.iter().enumerate().for_each(|(facet, &part)| parts[part].push(facet));
-        let is_closed = |part: &&Vec<usize>| {
-            let has_rim = |&facet: &usize| self.rims[facet].sides[..self.facets[facet].nodes().len()].contains(&true);
-            !part.is_empty() && !part.iter().any(has_rim)
-        };
+        let is_closed = |part: &Vec<usize>| !part.is_empty() && !part.iter().any(|&facet| self.is_open(facet));
         let sized = |part: Vec<usize>| (self.volume_of(part.iter().copied(), positions), part);
-        let closed: Vec<_> = parts.into_iter().filter(|part| is_closed(&part)).map(sized).collect();
+        let closed: Vec<_> = parts.into_iter().filter(is_closed).map(sized).collect();
         let (mut hollows, solids): (Vec<_>, Vec<_>) = closed.into_iter().partition(|(volume, _)| *volume < 0.0);
         // From the outside to the inside. Of overlapping solids, as before a press fit, the larger one has the
         // hollow.

@@ -3,12 +3,10 @@
 
 use super::Surface;
 use super::shape::{Point, Shape, cross, dot};
+use crate::rounding::ROUNDED_SHARE;
 
 /// How far facets are extended beyond their sides, in multiples of their size.
 const BEYOND: f64 = 1.25;
-
-/// Margin for rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// A cone that holds all normals of a facet and of its extension.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +28,7 @@ impl Cone {
             }
             most = most.max(dot(turned, turned) / dot(product, product));
         }
-        Self { axis, sine: most.sqrt() + ROUNDING }
+        Self { axis, sine: most.sqrt() + ROUNDED_SHARE }
     }
 
     /// A bound of the cosine between the normals of two facets: cos (θ − α) ≤ cos θ + 2 sin (α/2).
@@ -79,7 +77,7 @@ impl Cones {
     /// the angle with this sine, with facets extended beyond their sides by a share of their size plus `way`.
     pub(super) fn is_even(&self, surface: &Surface, facet: usize, sine: f64, (share, way): (f64, f64)) -> bool {
         let places = &surface.places(facet)[..surface.facets()[facet].nodes().len()];
-        let is_even = |&place: &usize| self.spreads[place] < (1.0 - ROUNDING) * sine;
+        let is_even = |&place: &usize| self.spreads[place] < (1.0 - ROUNDED_SHARE) * sine;
         way <= (BEYOND - share) * self.finest && places.iter().all(is_even)
     }
 
@@ -91,7 +89,7 @@ impl Cones {
     pub(super) fn surely_face(&self, surface: &Surface, place: usize, other: (&Self, usize), limit: f64) -> bool {
         let (others, facet) = other;
         let cone = &others.of_facets[facet];
-        let limit = limit.min(0.0) - ROUNDING;
+        let limit = limit.min(0.0) - ROUNDED_SHARE;
         surface.corners_at(place).iter().all(|&(facet, _)| self.of_facets[facet].cosine(cone) < limit)
     }
 }

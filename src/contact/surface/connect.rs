@@ -20,7 +20,7 @@ impl Surface {
     /// [`Error::Dimension`] if the dimension is not 2 or 3, if a facet does not fit, or if a node does not exist;
     /// [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
     /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
-    /// [`Error::Incompatible`] where more than two facets share a side, and on surfaces of one side (Möbius).
+    /// [`Error::Incompatible`] where more than two facets share a side.
     pub fn new<T: Real, F: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         facets: impl IntoIterator<Item = F>,
@@ -49,11 +49,7 @@ impl Surface {
             for nodes in [nodes, others] {
                 check_nodes("the nodes of a facet (at most)", nodes, coordinates.len())?;
             }
-            if !facet.shape(coordinates).is_regular() {
-                let reason = match facet.shape(coordinates).is_degenerate() {
-                    true => "it has no length or area, or a corner that is straight",
-                    false => "its normals point to both sides; give its nodes in the order around it",
-                };
+            if let Some(reason) = facet.shape(coordinates).fault() {
                 return Err(Error::InvertedFacet { facet: index, nodes: nodes.to_vec(), reason });
             }
         }
@@ -105,69 +101,32 @@ impl Surface {
             }
         }
         sides.sort_unstable();
-        // Neighboring facets, and whether their orientations agree.
-        let mut pairs = Vec::new();
+        // By facet, the number of neighbors with the opposite orientation.
+        let mut opposite = vec![0; self.facets.len()];
         for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             match *group {
                 [] | [_] => {}
                 [(.., i, k, one), (.., j, l, other)] => {
-                    pairs.push((i, j, one != other));
-                    self.neighbors[i][k] = Some((j, l));
-                    self.neighbors[j][l] = Some((i, k));
-                    self.rims[i].sides[k] = false;
-                    self.rims[j].sides[l] = false;
-                }
-                [_, _, (_, _, facet, ..), ..] => {
-                    return Err(refuse(
-                        facet,
-                        "it shares a side with two facets or more, and a surface must not branch",
-                    ));
-                }
-            }
-        }
-        self.orient(&pairs)
-    }
-
-    /// Rejects facets with the opposite orientation of their neighbors: of two sets that contradict each other, the
-    /// smaller.
-    fn orient(&self, pairs: &[(usize, usize, bool)]) -> Result<()> {
-        if pairs.iter().all(|&(.., agree)| agree) {
-            return Ok(());
-        }
-        // The orientation of each facet relative to the first facet of its part, once it is visited.
-        let mut faces: Vec<Option<bool>> = vec![None; self.facets.len()];
-        for first in 0..self.facets.len() {
-            if faces[first].is_some() {
-                continue;
-            }
-            faces[first] = Some(true);
-            let mut part = vec![first];
-            let mut next = 0;
-            while let Some(&facet) = part.get(next) {
-                next += 1;
-                for &(i, j, agree) in pairs.iter().filter(|&&(i, j, _)| i == facet || j == facet) {
-                    let other = if i == facet { j } else { i };
-                    let expected = (faces[facet] == Some(true)) == agree;
-                    match faces[other] {
-                        None => {
-                            faces[other] = Some(expected);
-                            part.push(other);
-                        }
-                        Some(found) if found != expected => {
-                            return Err(refuse(other, "the surface has one side only"));
-                        }
-                        Some(_) => {}
+                    for (facet, side, neighbor) in [(i, k, (j, l)), (j, l, (i, k))] {
+                        self.neighbors[facet][side] = Some(neighbor);
+                        self.rims[facet].sides[side] = false;
+                        opposite[facet] += usize::from(one == other);
                     }
                 }
-            }
-            let front = part.iter().filter(|&&facet| faces[facet] == Some(true)).count();
-            let smaller = 2 * front < part.len();
-            if let Some(&facet) = part.iter().filter(|&&facet| faces[facet] == Some(smaller)).min() {
-                let reason = "its normal points to the other side than those of its neighbors; turn it";
-                return Err(Error::InvertedFacet { facet, nodes: self.facets[facet].nodes().to_vec(), reason });
+                [_, _, (_, _, facet, ..), ..] => {
+                    let reason = "it shares a side with two facets or more, and a surface must not branch";
+                    return Err(refuse(facet, reason));
+                }
             }
         }
-        Ok(())
+        match (0..opposite.len()).rev().max_by_key(|&facet| opposite[facet]) {
+            Some(facet) if opposite[facet] > 0 => {
+                let reason =
+                    "its normal and those of its neighbors point to different sides; turn it, or the neighbors";
+                Err(Error::InvertedFacet { facet, nodes: self.facets[facet].nodes().to_vec(), reason })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Marks the vertices at the ends of open sides as rim vertices.

@@ -1,7 +1,7 @@
 //! Nodes in a dent of a surface: a node that presses on one facet there may press on the adjacent facets as well.
 
 use super::projection::{Ground, Stand};
-use super::shape::{Location, Point, Shape, cross, dot, norm, sub};
+use super::shape::{Location, Point, Rim, Shape, cross, dot, norm, sub};
 
 /// Distance from the sides of a dent, as a share of the facet and beyond the node's displacement, within which a node
 /// may come to press on them in a step.
@@ -33,16 +33,12 @@ impl Ground<'_> {
                 let others = surface.facets()[facet].nodes();
                 facet != stand.facet && !nodes[..k].iter().any(|earlier| others.contains(earlier))
             };
-            let met = move |facet: usize| self.kin.is_none_or(|kin| !kin.keeps_apart(stand.place, facet));
+            let met = move |facet: usize| self.may_meet(stand.place, facet);
             surface.facets_at(stand.facet, k).filter(move |&facet| is_new(facet) && met(facet)).filter_map(
                 move |facet| {
                     let other = surface.facets()[facet].shape(positions);
-                    let (normal, beyond) = (normal?, NEAR + way / other.size());
-                    let rises = dot(normal, sub(other.middle(), positions[vertex])) >= 0.0;
-                    if !rises || other.is_turned_less(normal, LEAST_SINE, beyond) {
-                        return None;
-                    }
-                    let beside = self.on_plane(stand.place, facet, beyond)?;
+                    let normal = normal.filter(|n| dot(*n, sub(other.middle(), positions[vertex])) >= 0.0)?;
+                    let beside = self.on_plane(stand.place, facet, NEAR + way / other.size())?;
                     let is_dent = self.is_dent((stand, normal), &shape, &beside, &other, positions[vertex]);
                     let is_met = || self.meets((stand.place, facet), beside.normal, self.own_normal(stand.place));
                     (is_dent && is_met()).then_some(beside)
@@ -134,7 +130,8 @@ impl Ground<'_> {
     /// The projection of a node onto a facet extended by a share of itself; none farther out.
     fn on_plane(&self, place: usize, facet: usize, beyond: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
-        let (shape, foot) = self.surface.project_on_plane(facet, p, beyond, self.positions)?;
+        let shape = self.surface.facets()[facet].shape(self.positions);
+        let foot = shape.project(p, Rim::all_around(beyond))?;
         let normal = shape.normal(&foot.weights).filter(|_| foot.location != Location::Beyond)?;
         let distance = dot(normal, sub(p, foot.point));
         Some(self.stand((place, facet), Location::Inside, foot.weights, normal, distance))

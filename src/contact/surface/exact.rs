@@ -9,15 +9,11 @@
 //! as possible to match the integral while ∫ dA and ∫ x dA stay.
 
 use super::overlap::Flat;
+use super::polygon::{cross, difference};
+use crate::rounding::{DEPENDENT, SKEWED};
 
 /// The most points of a rule: six triangles of an octagon, twelve points each.
 const MOST: usize = 72;
-
-/// Deviation from a parallelogram, as a share of the sides, below which the rule is not corrected.
-const SKEWED: f64 = 1e-4;
-
-/// Share of the square of a function that is left after projection, below which it counts as linearly dependent.
-const ALIKE: f64 = 1e-12;
 
 /// Largest relative change of a weight; only rounding leads to larger ones.
 const MOST_CHANGE: f64 = 0.5;
@@ -66,70 +62,58 @@ impl RulePoints {
     }
 
     /// Changes the weights until ∫ s t dA of both facets equals its contour integral around the polygon.
-    pub(super) fn correct(&mut self, [slave, master]: [&Flat; 2], polygon: &[[f64; 2]]) {
-        let count = self.count;
-        let points = &self.points[..count];
-        let Some(first) = points.first().map(|point| point.at) else { return };
-        let sum = |f: &Function, g: &Function| -> f64 {
-            points.iter().zip(f.iter().zip(g)).map(|(point, (f, g))| point.weight * f * g).sum()
+    ///
+    /// The factors of the weights are 1 + Σ λ_j f_j, with 1, x, y and s t of both facets as functions f_j less their
+    /// values at the first point. Then the missing integrals are a linear function of λ, with a Gram matrix.
+    pub(super) fn correct(&mut self, flats: [&Flat; 2], polygon: &[[f64; 2]]) {
+        let points = &mut self.points[..self.count];
+        let Some(&first) = points.first() else { return };
+        let functions = |point: &RulePoint| {
+            let [x, y] = difference(point.at, first.at);
+            [1.0, x, y, point.slave[2] - first.slave[2], point.master[2] - first.master[2]]
         };
-        // Makes a function orthogonal to another one with this sum of squares. Values behind the last point are not
-        // read.
-        let leave_out = |function: &mut Function, other: &Function, square: f64| {
-            if square > 0.0 {
-                let share = sum(function, other) / square;
-                function[..count].iter_mut().zip(&other[..count]).for_each(|(x, other)| *x -= share * other);
-            }
-        };
-        let of = |value: &dyn Fn(&RulePoint) -> f64| -> Function {
-            let mut function = [0.0; MOST];
-            function.iter_mut().zip(points).for_each(|(x, point)| *x = value(point));
-            function
-        };
-        // The functions whose integrals must stay, made orthogonal; then the missing integrals.
-        let one = of(&|_| 1.0);
-        let mut kept = [one, of(&|point| point.at[0] - first[0]), of(&|point| point.at[1] - first[1])];
-        let mut squares = [0.0; 3];
-        for k in 0..3 {
-            let (before, this) = kept.split_at_mut(k);
-            before.iter().zip(squares).for_each(|(other, square)| leave_out(&mut this[0], other, square));
-            squares[k] = sum(&this[0], &this[0]);
-        }
-        let mut factors: Function = [1.0; MOST];
-        let mut before: Option<(Function, f64, f64)> = None;
-        for (flat, product) in [(slave, of(&|point| point.slave[2])), (master, of(&|point| point.master[2]))] {
-            // Shape functions of a triangle are linear.
-            if flat.count < 4 {
-                continue;
-            }
-            // On a parallelogram s t is a polynomial, which the rule integrates exactly. The new weights must keep
-            // that.
-            let mut missing = match flat.is_skewed() {
-                true => flat.integral_of_product(polygon) - sum(&product, &one),
-                false => 0.0,
-            };
-            let mut rest = product;
-            kept.iter().zip(squares).for_each(|(other, square)| leave_out(&mut rest, other, square));
-            let whole = sum(&rest, &rest);
-            if let Some((other, square, of_other)) = &before {
-                missing -= sum(&rest, other) / square * of_other;
-                leave_out(&mut rest, other, *square);
-            }
-            let square = sum(&rest, &rest);
-            let largest = rest[..self.count].iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            if square > ALIKE * whole && missing.abs() * largest < MOST_CHANGE * square {
-                factors[..count].iter_mut().zip(&rest).for_each(|(factor, rest)| *factor += missing / square * rest);
-                before = Some((rest, square, missing));
+        let mut gram = [[0.0; 5]; 5];
+        for point in &*points {
+            let values = functions(point);
+            for (row, value) in gram.iter_mut().zip(values) {
+                row.iter_mut().zip(values).for_each(|(entry, other)| *entry += point.weight * value * other);
             }
         }
-        self.points.iter_mut().zip(factors).for_each(|(point, factor)| point.weight *= factor);
+        // On a parallelogram, and on a triangle, s t is a polynomial, which the rule integrates exactly.
+        let mut missing = [0.0; 5];
+        for (k, (flat, first)) in [(3, (flats[0], first.slave[2])), (4, (flats[1], first.master[2]))] {
+            if flat.is_skewed() {
+                missing[k] = flat.integral_of_product(polygon) - gram[0][k] - first * gram[0][0];
+            }
+        }
+        let multipliers = solve(gram, missing);
+        let change = |point: &RulePoint| functions(point).iter().zip(multipliers).map(|(f, by)| f * by).sum::<f64>();
+        if points.iter().all(|point| change(point).abs() < MOST_CHANGE) {
+            points.iter_mut().for_each(|point| point.weight *= 1.0 + change(point));
+        }
     }
 }
 
-type Function = [f64; MOST];
-
-fn cross([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
-    a * d - b * c
+/// Solves a symmetric semidefinite system by elimination; unknowns of linearly dependent functions are zero.
+fn solve(mut matrix: [[f64; 5]; 5], mut right: [f64; 5]) -> [f64; 5] {
+    let sizes: [f64; 5] = std::array::from_fn(|k| matrix[k][k]);
+    let is_pivot = |matrix: &[[f64; 5]; 5], k: usize| matrix[k][k] > DEPENDENT * sizes[k];
+    for k in (0..5).filter(|&k| sizes[k] > 0.0) {
+        if is_pivot(&matrix, k) {
+            let pivot = matrix[k];
+            for i in k + 1..5 {
+                let share = matrix[i][k] / pivot[k];
+                (k..5).for_each(|j| matrix[i][j] -= share * pivot[j]);
+                right[i] -= share * right[k];
+            }
+        }
+    }
+    let mut x = [0.0; 5];
+    for k in (0..5).rev().filter(|&k| is_pivot(&matrix, k)) {
+        let known: f64 = (k + 1..5).map(|j| matrix[k][j] * x[j]).sum();
+        x[k] = (right[k] - known) / matrix[k][k];
+    }
+    x
 }
 
 impl Flat {
@@ -141,10 +125,10 @@ impl Flat {
     }
 
     /// The vectors a, b and c of a quadrilateral.
-    fn sides(&self) -> [[f64; 2]; 3] {
-        let from = |k: usize| -> [f64; 2] { std::array::from_fn(|i| self.corners[k][i] - self.corners[0][i]) };
-        let (a, b) = (from(1), from(3));
-        [a, b, std::array::from_fn(|i| from(2)[i] - a[i] - b[i])]
+    pub(super) fn sides(&self) -> [[f64; 2]; 3] {
+        let [x0, x1, x2, x3] = self.corners;
+        let (a, b) = (difference(x1, x0), difference(x3, x0));
+        [a, b, difference(difference(x2, x0), [a[0] + b[0], a[1] + b[1]])]
     }
 
     /// ∫ s t dA over a counterclockwise polygon, up to errors along cuts, which cancel in the sum over all parts.
@@ -154,7 +138,7 @@ impl Flat {
         let mut sum = 0.0;
         for (k, from) in polygon.iter().enumerate() {
             let to = polygon[(k + 1) % polygon.len()];
-            let way = [to[0] - from[0], to[1] - from[1]];
+            let way = difference(to, *from);
             for (weight, place) in LINE.into_iter().flat_map(|(weight, off)| [(weight, 0.5 - off), (weight, 0.5 + off)])
             {
                 let [_, w1, w2, w3] = self.weights_at([from[0] + place * way[0], from[1] + place * way[1]]);

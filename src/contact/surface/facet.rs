@@ -74,9 +74,8 @@ impl Facet {
     }
 
     fn parts<const N: usize>(kind: Kind, nodes: &[usize]) -> [Self; N] {
-        const NUMBERS: [u8; 5] = [0, 1, 2, 3, 4];
         std::array::from_fn(|part| {
-            let (nodes, count, whole) = Whole::part(kind, NUMBERS[part], nodes);
+            let (nodes, count, whole) = Whole::part(kind, part, nodes);
             Self { nodes, count, whole: Some(whole) }
         })
     }

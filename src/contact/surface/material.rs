@@ -9,6 +9,7 @@
 use super::Surface;
 use super::search::{Bounds, Neighborhood};
 use super::shape::{Point, dot};
+use crate::rounding::ROUNDED_SHARE;
 
 /// Largest cosine between the normal of a node and the normal of a facet that bounds the material behind it. Sides
 /// across a right angle count, because they face the node once the body bends.
@@ -19,9 +20,6 @@ const DEPTH: f64 = 0.5;
 
 /// Range in which the thickness is measured, in multiples of the reach or of a typical facet, whichever is longer.
 const RANGE: f64 = 2.0;
-
-/// Relative rounding of a depth.
-const ROUNDING: f64 = 1e-6;
 
 /// The body of each facet, and the largest depth of contact from the material behind each node.
 #[derive(Debug)]
@@ -59,9 +57,9 @@ impl Material {
                 let (shape, foot) = &projected;
                 let normal = shape.normal(&foot.weights).filter(|normal| dot(own, *normal) <= INSIDE);
                 // Beside a side or a vertex a node may be behind the plane of a facet and still outside the body.
-                let counts = (ROUNDING, &|_| true);
+                let counts = (ROUNDED_SHARE, &|_| true);
                 let (_, height) = surface.direction(facet, positions[node], &projected, counts, positions)?;
-                let is_behind = height < 0.0 && foot.distance > (1.0 + ROUNDING) * overlap;
+                let is_behind = height < 0.0 && foot.distance > (1.0 + ROUNDED_SHARE) * overlap;
                 (is_behind && normal.is_some()).then_some(DEPTH * foot.distance)
             });
             behind.fold(most, f64::min)

@@ -1,14 +1,13 @@
 //! Lists of the facets near each node, nearest first, so that the search for the closest facet ends early.
 
 use super::reach::Reach;
-use super::search::{Bounds, each_near, overhang_of};
+use super::search::{Bounds, Lists, each_near, overhang_of};
 use super::shape::Point;
 
 /// For each node of a list the facets near it, and the distances of their boxes when the lists were built, ascending.
 #[derive(Debug, Default)]
 pub(crate) struct NearestFirst {
-    starts: Vec<usize>,
-    entries: Vec<(f64, usize)>,
+    lists: Lists<(f64, usize)>,
     /// The longest side of the boxes when the lists were built.
     extent: f64,
 }
@@ -16,28 +15,20 @@ pub(crate) struct NearestFirst {
 impl NearestFirst {
     /// Rebuilds the lists of the facets whose boxes are within `range` of each node.
     pub(crate) fn build(&mut self, nodes: &[usize], positions: &[Point], boxes: &[Bounds], range: f64) {
-        let Self { starts, entries, extent } = self;
-        starts.clear();
-        entries.clear();
-        starts.push(0);
-        *extent = boxes.iter().map(Bounds::extent).fold(0.0, f64::max);
-        let mut places = nodes.iter().map(|&node| positions[node]);
-        let points = nodes.iter().map(|&node| Bounds::of_points([positions[node]]));
-        each_near(points, boxes.iter().copied(), range, |near| {
-            let start = entries.len();
+        self.lists.clear();
+        self.extent = boxes.iter().map(Bounds::extent).fold(0.0, f64::max);
+        let points = nodes.iter().map(|&node| positions[node]);
+        let mut places = points.clone();
+        each_near(points.map(|x| Bounds::of_points([x])), boxes.iter().copied(), range, |near| {
             let x = places.next().unwrap_or_default();
-            entries.extend(near.iter().map(|&facet| (boxes[facet].distance(x), facet)));
-            entries[start..].sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-            starts.push(entries.len());
+            let list = self.lists.push(near.iter().map(|&facet| (boxes[facet].distance(x), facet)));
+            list.sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
         });
     }
 
     /// The list of the k-th node: distances of boxes when the lists were built, and facets.
     pub(crate) fn of(&self, k: usize) -> &[(f64, usize)] {
-        match self.starts.get(k..k + 2) {
-            Some(range) => &self.entries[range[0]..range[1]],
-            None => &[],
-        }
+        self.lists.of(k)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Surface;
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub, unit};
+use crate::rounding::ROUNDED_SHARE;
 
 impl Surface {
     /// Normalized sum of the normals on both sides of a side, at its share `s`. The far one is added only if it
@@ -30,9 +31,7 @@ impl Surface {
     fn node_normal_of(&self, node: usize, counts: &impl Fn(Point) -> bool, positions: &[Point]) -> Option<Point> {
         let sum = self.corners_around(node).fold([0.0; 3], |sum, (facet, k)| {
             let shape = self.facets[facet].shape(positions);
-            let mut weights = [0.0; 4];
-            weights[k] = 1.0;
-            match shape.normal(&weights).filter(|normal| counts(*normal)) {
+            match shape.normal(&shape.on_side(k, 0.0)).filter(|normal| counts(*normal)) {
                 Some(normal) => add_scaled(sum, shape.angle(k), normal),
                 None => sum,
             }
@@ -85,7 +84,6 @@ impl Surface {
         /// Least height of the point in front of the facet, as a share of the facet. Nearly flush edges count as one
         /// surface.
         const FLUSH: f64 = 0.02;
-        const ROUNDING: f64 = 1e-9;
         let (corner, neighbor) = match location {
             Location::Side(k) => (k, self.neighbors[facet][k].map(|(neighbor, _)| neighbor)),
             Location::Vertex(k) => (k, None),
@@ -98,13 +96,13 @@ impl Surface {
         };
         let there = || self.facets_at(facet, corner).filter(|&other| is_there(other));
         there().any(|one| {
-            let shape = self.facets[one].shape(positions);
-            let Some(normal) = shape.normal(&[1.0 / shape.corners().len() as f64; 4]) else { return false };
+            let Some(normal) = self.facets[one].normal(positions) else { return false };
             let is_behind = |other: usize| {
                 let shape = self.facets[other].shape(positions);
-                dot(normal, sub(shape.middle(), at)) <= ROUNDING * shape.size()
+                dot(normal, sub(shape.middle(), at)) <= ROUNDED_SHARE * shape.size()
             };
-            dot(normal, arm) > FLUSH * shape.size() && there().all(|other| other == one || is_behind(other))
+            dot(normal, arm) > FLUSH * self.facets[one].shape(positions).size()
+                && there().all(|other| other == one || is_behind(other))
         })
     }
 

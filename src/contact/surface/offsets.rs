@@ -31,10 +31,7 @@ impl Thickness {
         if self.is_none() {
             return [0.0; 2];
         }
-        let of = |body: &Vec<usize>| {
-            let sizes = body.iter().map(|&node| factor * self.by_node[node]);
-            sizes.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-        };
+        let of = |body: &Vec<usize>| range(body.iter().map(|&node| factor * self.by_node[node]));
         let [one, other] = bodies.each_ref().map(of);
         [(one[0] + other[0]).min(0.0), (one[1] + other[1]).max(0.0)]
     }
@@ -85,10 +82,15 @@ impl Offsets<'_> {
 
     /// A bound of the absolute value of that sum, with the factor.
     pub(crate) fn most(&self, node: usize, facet: &Facet) -> f64 {
-        let corners = self.at_corners(facet);
-        let [low, high] =
-            corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
-        let own = self.of(node);
-        (self.factor * (own + low)).abs().max((self.factor * (own + high)).abs())
+        if self.is_none() {
+            return 0.0;
+        }
+        let ends = range(self.at_corners(facet).into_iter()).map(|end| self.factor * (self.of(node) + end));
+        ends[0].abs().max(ends[1].abs())
     }
+}
+
+/// The least and the largest of some values.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }

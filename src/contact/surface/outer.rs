@@ -6,6 +6,7 @@ use super::{Facet, Surface};
 use crate::contact::check_nodes;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::SMALLEST_AREA;
 
 /// Sides of cells by their corners, with outward normals for the usual numbering of corners: counter-clockwise for
 /// triangles and quadrilaterals, and the first face counter-clockwise seen from inside for the other cells.
@@ -139,7 +140,6 @@ impl<'c> Cell<'c> {
 
     /// Its volume (area in two dimensions) with straight edges; negative if its corners are in the reverse order.
     fn volume(&self, coordinates: &[Point]) -> Result<f64> {
-        const SMALL: f64 = 1e-12;
         let corners = &self.nodes[..self.corners];
         let middle = middle_of(corners, coordinates);
         let from_middle = |corner: usize| sub(coordinates[self.nodes[corner]], middle);
@@ -158,7 +158,7 @@ impl<'c> Cell<'c> {
         }
         let size = (0..self.corners).map(|corner| norm(from_middle(corner))).fold(0.0, f64::max);
         let power = if self.sides[0].len() == 2 { 2 } else { 3 };
-        match volume.abs() > SMALL * size.powi(power) {
+        match volume.abs() > SMALLEST_AREA * size.powi(power) {
             true => Ok(volume),
             false => Err(refuse(self.index, "it has no volume: its nodes are in a wrong order, or it is flat")),
         }

@@ -1,7 +1,7 @@
 //! Output of a surface: areas and normals of its nodes, and the pressures and shear stresses from nodal forces.
 
 use super::nodes::points;
-use super::shape::{Point, Shape, add_scaled, cross, dot, norm};
+use super::shape::{Point, Shape, add_scaled, dot, norm};
 use super::{Facet, Surface};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -23,7 +23,12 @@ impl Surface {
     /// As [`areas`](Self::areas), with points in space.
     pub(crate) fn areas_at(&self, positions: &[Point]) -> Vec<f64> {
         let mut areas = vec![0.0; self.nodes.len()];
-        self.integrate(positions, |place, share, area| areas[place] += share * norm(area));
+        for (facet, places) in self.facets.iter().zip(&self.places) {
+            for (weights, area) in quadrature(facet, &facet.shape(positions)) {
+                let shares = places.iter().zip(weights).take(facet.count);
+                shares.for_each(|(&place, share)| areas[place] += share * norm(area));
+            }
+        }
         areas
     }
 
@@ -163,18 +168,6 @@ impl Surface {
         moved
     }
 
-    /// Calls `act` with the place of the node, its shape function, and area times normal, at each quadrature point.
-    fn integrate(&self, positions: &[Point], mut act: impl FnMut(usize, f64, Point)) {
-        for facet in &self.facets {
-            let shape = facet.shape(positions);
-            for (weights, area) in quadrature(facet, &shape) {
-                for (&node, share) in facet.nodes().iter().zip(weights) {
-                    act(self.place(node), share, area);
-                }
-            }
-        }
-    }
-
     /// Positions or vectors of all nodes of a mesh, as points in space.
     fn points<T: Real, const D: usize>(&self, of_nodes: &[[T; D]]) -> Result<Vec<Point>> {
         if D != self.dimension {
@@ -218,11 +211,7 @@ fn pressures_of(force: Point, faces: &[Face]) -> (Vec<f64>, Point) {
 
 /// Shape functions at the quadrature points of a facet, each with its area times the normal.
 fn quadrature(facet: &Facet, shape: &Shape) -> Vec<([f64; 4], Point)> {
-    let at = |weights: [f64; 4], share: f64| {
-        let [first, second] = shape.tangents_at(&weights);
-        let second = if shape.is_segment() { [0.0, 0.0, 1.0] } else { second };
-        (weights, cross(first, second).map(|x| share * x))
-    };
+    let at = |weights: [f64; 4], share: f64| (weights, shape.product(&weights).map(|x| share * x));
     // One point is exact for linear functions on segments and triangles. On a bilinear quadrilateral N n dA is of
     // degree two in each direction.
     match facet.count {

@@ -5,9 +5,11 @@
 //! 2004, section 4). In two dimensions it is a part of a line.
 
 use super::exact::{RulePoint, RulePoints};
-use super::polygon::{Polygon, Rule};
+use super::offsets::range;
+use super::polygon::{Polygon, Rule, cross as cross_in_plane, difference};
 use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
 use super::{Facet, Surface};
+use crate::rounding::{SLIVER, rounding};
 
 /// A quadrature point on the part of a slave facet that a master facet covers.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +51,6 @@ pub(crate) struct Base {
     /// Its corners in the plane.
     corners: [[f64; 2]; 4],
     count: usize,
-    size: f64,
     /// By side, the facet behind a sharp edge: a point of it, and its normal.
     beside: [Option<[Point; 2]>; 4],
     /// Whether it is a part of a facet of second order.
@@ -65,9 +66,6 @@ pub(crate) fn middle(count: usize) -> [f64; 4] {
 /// Least cosine between the normal of a facet and the reversed normal of another one in contact: 60 degrees.
 const FACING: f64 = 0.5;
 
-/// Common parts below this share of the facet's size are dropped.
-const SLIVER: f64 = 1e-12;
-
 /// Largest cosine between the normals of facets at a sharp edge: 37 degrees.
 const SHARP: f64 = 0.8;
 
@@ -81,13 +79,12 @@ impl Base {
     pub(crate) fn new(facet: &Facet, positions: &[Point]) -> Option<Self> {
         let (shape, count) = (facet.shape(positions), facet.nodes().len());
         let [first, second] = shape.tangents_at(&middle(count));
-        let second = if count == 2 { [0.0, 0.0, 1.0] } else { second };
         let product = cross(first, second);
         let normal = unit(product)?;
         let along = unit(first)?;
         let axes = [along, cross(normal, along)];
-        let (corners, size, curved) = ([[0.0; 2]; 4], shape.size(), facet.whole.is_some());
-        let mut base = Self { shape, normal, product, axes, corners, count, size, curved, beside: [None; 4] };
+        let (corners, curved) = ([[0.0; 2]; 4], facet.whole.is_some());
+        let mut base = Self { shape, normal, product, axes, corners, count, curved, beside: [None; 4] };
         base.corners = std::array::from_fn(|k| base.in_plane(shape.corner(k)));
         Some(base)
     }
@@ -128,33 +125,28 @@ impl Base {
         if self.beside.iter().all(Option::is_none) || self.lowest(facet, positions) >= 0.0 {
             return false;
         }
-        let (mut beside, mut all) = (0.0, 0.0);
+        let is_beside = |sample: &Sample| {
+            self.is_beside(add_scaled(self.shape.point(&sample.slave), sample.gap, self.normal), sample.gap)
+        };
+        let corners = || facet.nodes().iter().zip(self.heights(facet, positions));
+        self.mostly(facet, positions, is_beside)
+            .unwrap_or_else(|| corners().all(|(&node, gap)| self.is_beside(positions[node], gap)))
+    }
+
+    /// Whether a condition holds on more than half of the area that a master facet covers; none if it covers nothing.
+    fn mostly(&self, facet: &Facet, positions: &[Point], holds: impl Fn(&Sample) -> bool) -> Option<bool> {
+        let (mut some, mut all) = (0.0, 0.0);
         self.each_sample(facet, positions, &mut |sample| {
-            let x = add_scaled(self.shape.point(&sample.slave), sample.gap, self.normal);
             all += sample.area;
-            beside += if self.is_beside(x, sample.gap) { sample.area } else { 0.0 };
+            some += if holds(sample) { sample.area } else { 0.0 };
         });
-        if all > 0.0 {
-            return 2.0 * beside > all;
-        }
-        facet
-            .nodes()
-            .iter()
-            .zip(self.heights(facet, positions))
-            .all(|(&node, gap)| self.is_beside(positions[node], gap))
+        (all > 0.0).then_some(2.0 * some > all)
     }
 
     /// Whether more than half of the area that a master facet covers is deeper than `depth` behind this facet.
     pub(crate) fn is_deeper(&self, facet: &Facet, positions: &[Point], depth: f64) -> bool {
-        if self.lowest(facet, positions) >= -depth {
-            return false;
-        }
-        let (mut deep, mut all) = (0.0, 0.0);
-        self.each_sample(facet, positions, &mut |sample| {
-            all += sample.area;
-            deep += if -sample.gap > depth { sample.area } else { 0.0 };
-        });
-        2.0 * deep > all
+        self.lowest(facet, positions) < -depth
+            && self.mostly(facet, positions, |sample| -sample.gap > depth) == Some(true)
     }
 
     #[inline]
@@ -191,7 +183,7 @@ impl Base {
             return self.along_a_line(&shape, &master, act);
         }
         let own = Flat { corners: self.corners, count: self.count };
-        let Some(common) = own.common(&master, SLIVER * self.size * self.size) else { return };
+        let Some(common) = own.common(&master, SLIVER * self.shape.square_of_size()) else { return };
         let (curved, quadrilateral) = (self.curved || facet.whole.is_some(), self.count == 4 || count == 4);
         let rule = match (curved, quadrilateral) {
             (false, false) => Rule::Two,
@@ -287,16 +279,8 @@ impl Base {
     /// segment is the unit vector out of plane.
     #[inline]
     pub(crate) fn stretch(&self, weights: &[f64; 4]) -> (Point, [Point; 4]) {
-        let tangents = self.tangents(weights);
+        let tangents = self.shape.tangents_at(weights);
         (cross(tangents[0], tangents[1]), self.turned_by(tangents, weights, self.normal))
-    }
-
-    /// The tangents at the point with these shape functions. The second one of a segment is the unit vector out of
-    /// plane.
-    #[inline]
-    fn tangents(&self, weights: &[f64; 4]) -> [Point; 2] {
-        let [first, second] = self.shape.tangents_at(weights);
-        [first, if self.count == 2 { [0.0, 0.0, 1.0] } else { second }]
     }
 
     /// An orthonormal frame that turns with the facet: its first tangent at the middle, the vector across it, and n.
@@ -312,7 +296,7 @@ impl Base {
         let [first, _] = self.shape.tangents_at(&weights);
         let tilted = self.turned(&weights, cross(q, self.normal).map(|x| x / norm(self.product)));
         let spin = dot(self.normal, q) / norm(first);
-        let [by_corner, _] = derivatives(self.count, &weights);
+        let [by_corner, _] = self.shape.derivatives(&weights);
         std::array::from_fn(|k| add_scaled(tilted[k], spin * by_corner[k], self.axes[1]))
     }
 
@@ -322,23 +306,23 @@ impl Base {
     /// With d the vectors across n whose products with the tangents are 0 and 1, the coordinate ξ of the intersection
     /// changes by dξ = d · dx.
     pub(crate) fn slope(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], values: &[f64; 4]) -> Point {
-        let by_corner = derivatives(facet.nodes().len(), weights);
-        let change = by_corner.map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
-        self.gradient(facet, positions, weights, change)
+        let shape = facet.shape(positions);
+        let change = shape.derivatives(weights).map(|by| by.iter().zip(values).map(|(by, value)| by * value).sum());
+        self.gradient(&shape, weights, change)
     }
 
     /// As [`slope`](Self::slope), for the height along n of a master facet of second order over its linear part.
     pub(crate) fn slope_of_second_order(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4]) -> Point {
         let Some(whole) = &facet.whole else { return [0.0; 3] };
-        let slopes = whole.excess_slopes(weights, &derivatives(facet.nodes().len(), weights));
+        let shape = facet.shape(positions);
+        let slopes = whole.excess_slopes(weights, &shape.derivatives(weights));
         let change = slopes.map(|slopes| dot(self.normal, facet.combine(&slopes, positions)));
-        self.gradient(facet, positions, weights, change)
+        self.gradient(&shape, weights, change)
     }
 
     /// The gradient of a function with these derivatives with respect to the coordinates of a master facet.
-    fn gradient(&self, facet: &Facet, positions: &[Point], weights: &[f64; 4], change: [f64; 2]) -> Point {
-        let [first, second] = facet.shape(positions).tangents_at(weights);
-        let second = if facet.nodes().len() == 2 { [0.0, 0.0, 1.0] } else { second };
+    fn gradient(&self, shape: &Shape, weights: &[f64; 4], change: [f64; 2]) -> Point {
+        let [first, second] = shape.tangents_at(weights);
         let across = [cross(second, self.normal), cross(self.normal, first)];
         let area = dot(first, across[0]);
         let [along, beside] = change;
@@ -353,30 +337,15 @@ impl Base {
     /// functions.
     #[inline]
     pub(crate) fn turned(&self, weights: &[f64; 4], vector: Point) -> [Point; 4] {
-        self.turned_by(self.tangents(weights), weights, vector)
+        self.turned_by(self.shape.tangents_at(weights), weights, vector)
     }
 
     #[inline]
     fn turned_by(&self, [first, second]: [Point; 2], weights: &[f64; 4], vector: Point) -> [Point; 4] {
         // The second tangent of a segment is constant.
         let [by_first, by_second] = [cross(second, vector), cross(vector, first)];
-        let [one, other] = derivatives(self.count, weights);
+        let [one, other] = self.shape.derivatives(weights);
         std::array::from_fn(|k| add_scaled(by_first.map(|x| one[k] * x), other[k], by_second))
-    }
-}
-
-/// Coefficients of the corners in the two tangents at the point with these shape functions.
-#[inline]
-fn derivatives(count: usize, weights: &[f64; 4]) -> [[f64; 4]; 2] {
-    match count {
-        2 => [[-1.0, 1.0, 0.0, 0.0], [0.0; 4]],
-        3 => [[-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0]],
-        _ => {
-            let [w0, w1, w2, w3] = *weights;
-            let [upper, right] = [w2 + w3, w1 + w2].map(|share| 0.5 * share);
-            let [lower, left] = [w0 + w1, w0 + w3].map(|share| 0.5 * share);
-            [[-lower, lower, upper, -upper], [-left, -right, right, left]]
-        }
     }
 }
 
@@ -393,19 +362,18 @@ impl Flat {
     #[inline]
     pub(super) fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
         const ITERATIONS: usize = 12;
-        let from = |k: usize| [self.corners[k][0] - self.corners[0][0], self.corners[k][1] - self.corners[0][1]];
-        let r = [p[0] - self.corners[0][0], p[1] - self.corners[0][1]];
+        let r = difference(p, self.corners[0]);
         let solve = |a: [f64; 2], b: [f64; 2], r: [f64; 2]| {
-            let determinant = a[0] * b[1] - a[1] * b[0];
-            [(r[0] * b[1] - r[1] * b[0]) / determinant, (a[0] * r[1] - a[1] * r[0]) / determinant]
+            let determinant = cross_in_plane(a, b);
+            [cross_in_plane(r, b) / determinant, cross_in_plane(a, r) / determinant]
         };
         if self.count == 3 {
-            let [s, t] = solve(from(1), from(2), r);
+            let [a, b] = [1, 2].map(|k| difference(self.corners[k], self.corners[0]));
+            let [s, t] = solve(a, b, r);
             return [1.0 - s - t, s, t, 0.0];
         }
         // Coordinates from 0 to 1: x = x₀ + s a + t b + s t c.
-        let (a, b) = (from(1), from(3));
-        let c: [f64; 2] = std::array::from_fn(|i| from(2)[i] - a[i] - b[i]);
+        let [a, b, c] = self.sides();
         let size = a.iter().chain(&b).fold(0.0_f64, |size, x| size.max(x.abs()));
         let skew = c[0].abs().max(c[1].abs());
         let [mut s, mut t] = [0.5; 2];
@@ -415,7 +383,7 @@ impl Flat {
             let [ds, dt] = solve(by_s, by_t, missing);
             (s, t) = (s + ds, t + dt);
             // The residual is now ds dt c.
-            if (ds * dt).abs() * skew <= f64::EPSILON * size {
+            if (ds * dt).abs() * skew <= rounding(size) {
                 break;
             }
         }
@@ -427,10 +395,9 @@ impl Flat {
         let (mut begin, mut end) = (0.0_f64, 1.0_f64);
         for k in 0..self.count {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
-            let side = [b[0] - a[0], b[1] - a[1]];
+            let side = difference(b, a);
             // Height of the start over the side, and its gain along the segment.
-            let height = side[0] * (from[1] - a[1]) - side[1] * (from[0] - a[0]);
-            let gain = side[0] * way[1] - side[1] * way[0];
+            let (height, gain) = (cross_in_plane(side, difference(from, a)), cross_in_plane(side, way));
             if gain > 0.0 {
                 begin = begin.max(-height / gain);
             } else if gain < 0.0 {
@@ -447,10 +414,7 @@ impl Flat {
     #[inline]
     fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
         let is_apart = |axis: usize| {
-            let ends = [self, other].map(|flat| {
-                let corners = flat.corners[..flat.count].iter();
-                corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x[axis]), high.max(x[axis])])
-            });
+            let ends = [self, other].map(|flat| range(flat.corners[..flat.count].iter().map(|x| x[axis])));
             ends[0][0] > ends[1][1] || ends[1][0] > ends[0][1]
         };
         if is_apart(0) || is_apart(1) {

@@ -23,6 +23,16 @@ impl Rule {
     }
 }
 
+#[inline]
+pub(super) fn difference(x: [f64; 2], y: [f64; 2]) -> [f64; 2] {
+    [x[0] - y[0], x[1] - y[1]]
+}
+
+#[inline]
+pub(super) fn cross(x: [f64; 2], y: [f64; 2]) -> f64 {
+    x[0] * y[1] - x[1] * y[0]
+}
+
 /// A direction in the plane of a facet that is usually not perpendicular to any side.
 const APEX: [f64; 2] = [0.8146, 0.58];
 
@@ -52,10 +62,7 @@ impl Polygon {
     pub(super) fn area(&self) -> f64 {
         let corners = self.corners();
         let Some(&first) = corners.first() else { return 0.0 };
-        let triangle = |pair: &[[f64; 2]]| {
-            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
-            0.5 * (a[0] * b[1] - a[1] * b[0])
-        };
+        let triangle = |pair: &[[f64; 2]]| 0.5 * cross(difference(pair[0], first), difference(pair[1], first));
         corners.windows(2).map(triangle).sum()
     }
 
@@ -79,8 +86,8 @@ impl Polygon {
         let turned = self.turned_to_apex();
         let [first, rest @ ..] = turned.corners() else { return };
         for pair in rest.windows(2) {
-            let [a, b] = [0, 1].map(|k| [pair[k][0] - first[0], pair[k][1] - first[1]]);
-            let area = 0.5 * (a[0] * b[1] - a[1] * b[0]);
+            let [a, b] = [0, 1].map(|k| difference(pair[k], *first));
+            let area = 0.5 * cross(a, b);
             for &[weight, _, s, t] in rule.points() {
                 act(weight * area, [first[0] + s * a[0] + t * b[0], first[1] + s * a[1] + t * b[1]]);
             }
@@ -90,8 +97,8 @@ impl Polygon {
     /// The part of the polygon to the left of a line.
     #[inline]
     pub(super) fn cut(&self, from: [f64; 2], to: [f64; 2]) -> Self {
-        let along = [to[0] - from[0], to[1] - from[1]];
-        let left = |x: [f64; 2]| along[0] * (x[1] - from[1]) - along[1] * (x[0] - from[0]);
+        let along = difference(to, from);
+        let left = |x: [f64; 2]| cross(along, difference(x, from));
         let mut kept = Self::default();
         let Some(&last) = self.corners().last() else { return kept };
         let (mut before, mut height_before) = (last, left(last));

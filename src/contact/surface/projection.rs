@@ -2,17 +2,22 @@
 
 use super::Surface;
 use super::cones::Cones;
-use super::kin::{FACING, Kin};
 use super::material::Material;
 use super::nearest_first::{Kept, NearestFirst};
 use super::offsets::Offsets;
+use super::own_facets::OwnFacets;
 use super::search::{Bounds, overhang};
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub};
+use crate::rounding::ROUNDED_SHARE;
 use std::cell::OnceCell;
 
 /// Cosine of the angle between the normals of a node and a facet above which they are not in contact: both point to
 /// the same side.
 const SAME_SIDE: f64 = 0.5;
+
+/// Largest cosine between the normals of a node and of a facet beside it on its own body at which they face each other
+/// (an angle of 102°). Across a convex right angle they do not face each other.
+const FACING: f64 = -0.2;
 
 /// The same limit for the facet that a node is already projected on, within a step.
 const SAME_SIDE_OF_LAST: f64 = 0.75;
@@ -68,7 +73,7 @@ pub(crate) struct Ground<'a> {
     pub(crate) cones: [Option<&'a Cones>; 2],
     pub(crate) own: Option<&'a Surface>,
     /// The facets excluded for each node, if the nodes are on this same surface.
-    pub(crate) kin: Option<&'a Kin>,
+    pub(crate) own_facets: Option<&'a OwnFacets>,
     /// The material behind the nodes' own surface and behind this one, if both are known.
     pub(crate) material: Option<[&'a Material; 2]>,
     pub(crate) positions: &'a [Point],
@@ -90,8 +95,8 @@ impl Ground<'_> {
         (0..count).map(move |k| list.map_or((0.0, k), |list| list[k]))
     }
 
-    fn may_meet(&self, place: usize, facet: usize) -> bool {
-        self.kin.is_none_or(|kin| !kin.keeps_apart(place, facet))
+    pub(super) fn may_meet(&self, place: usize, facet: usize) -> bool {
+        self.own_facets.is_none_or(|own| !own.adjacent.holds(place, facet))
     }
 
     /// The corners of a facet moved along its normal by the offsets of the node and the facet, and the facet itself
@@ -99,9 +104,9 @@ impl Ground<'_> {
     pub(crate) fn layers(&self, place: usize, facet: usize) -> impl Iterator<Item = [Point; 4]> + use<> {
         let facet = &self.surface.facets()[facet];
         let corners = facet.nodes.map(|vertex| self.positions[vertex]);
-        let (shape, own) = (facet.shape(self.positions), self.offsets.of(self.nodes[place]));
+        let own = self.offsets.of(self.nodes[place]);
         let offsets = self.offsets.at_corners(facet).map(|offset| self.offsets.factor * (own + offset));
-        let normal = shape.normal(&[1.0 / facet.nodes().len() as f64; 4]).filter(|_| !self.offsets.is_none());
+        let normal = facet.normal(self.positions).filter(|_| !self.offsets.is_none());
         let outer = normal.map(|normal| std::array::from_fn(|k| add_scaled(corners[k], offsets[k], normal)));
         let is_behind = outer.is_none() || offsets[..facet.nodes().len()].iter().all(|offset| *offset > 0.0);
         outer.into_iter().chain(is_behind.then_some(corners))
@@ -114,17 +119,17 @@ impl Ground<'_> {
 
     /// The largest cosine between the normals of a node and a facet in contact.
     fn limit(&self, place: usize, facet: usize) -> f64 {
-        if self.is_kin(place, facet) { FACING } else { SAME_SIDE }
+        if self.is_nearby(place, facet) { FACING } else { SAME_SIDE }
     }
 
     /// Whether a facet is beside a node on its own body.
-    fn is_kin(&self, place: usize, facet: usize) -> bool {
-        self.is_of_one_body(place, facet) && self.kin.is_some_and(|kin| kin.is_beside(place, facet))
+    fn is_nearby(&self, place: usize, facet: usize) -> bool {
+        self.is_of_one_body(place, facet) && self.own_facets.is_some_and(|own| own.nearby.holds(place, facet))
     }
 
     fn is_of_one_body(&self, place: usize, facet: usize) -> bool {
         let of_own = |[own, _]: [&Material; 2]| own.is_of_one_body(self.surface, place, facet);
-        self.kin.is_some() && self.material.is_some_and(of_own)
+        self.own_facets.is_some() && self.material.is_some_and(of_own)
     }
 
     /// The largest depth behind a facet at which a node is in contact with it; none if the node's own surface is not
@@ -185,9 +190,8 @@ impl Ground<'_> {
         let own_normal = || *own_normal.get_or_init(|| self.own_normal(place));
         let own_place = self.own_place(place);
         let slack = self.kept.zip(self.lists).map_or(f64::INFINITY, |(kept, lists)| kept.slack(lists, node, p));
-        let is_even = self.offsets.is_none();
         // Heights are distances of offset surfaces. They differ from the distances of facets by at most this.
-        let most = |facet: usize| if is_even { 0.0 } else { self.offsets.most(node, &surface.facets()[facet]) };
+        let most = |facet: usize| self.offsets.most(node, &surface.facets()[facet]);
         let mut best: Option<(usize, (Shape, Foot), f64)> = None;
         let look_at = |facet: usize, best: &mut Option<(usize, (Shape, Foot), f64)>| {
             let limit = best.as_ref().map_or(reach, |(.., depth)| *depth) + most(facet);
@@ -251,7 +255,7 @@ impl Ground<'_> {
     pub(crate) fn last(&self, place: usize, facet: usize, reach: f64) -> Option<Stand> {
         let p = self.positions[self.nodes[place]];
         let projected = self.surface.project_beyond(facet, p, RIM_OF_LAST, self.positions)?;
-        let limit = if self.is_kin(place, facet) { FACING_OF_LAST } else { SAME_SIDE_OF_LAST };
+        let limit = if self.is_nearby(place, facet) { FACING_OF_LAST } else { SAME_SIDE_OF_LAST };
         let stays = projected.1.distance <= reach && faces(&projected, self.own_normal(place), limit);
         stays.then(|| self.on(place, facet, &projected)).flatten()
     }
@@ -270,14 +274,12 @@ impl Ground<'_> {
     /// vertex. The sharper one of the two keeps the row, because it may have rows in a dent, and because a node on a
     /// sharp corner slides off. If both are equally sharp, the first one keeps it.
     pub(crate) fn is_second(&self, stand: &Stand, pass: usize) -> bool {
-        /// Differences of sines below this are rounding.
-        const ROUNDING: f64 = 1e-6;
         let Some(vertex) = self.vertex(stand) else { return false };
         let node = self.nodes[stand.place];
         let own = self.own.map_or(0.0, |own| own.rise(node, self.positions));
         let steeper = own - self.surface.rise(vertex, self.positions);
-        let comes_later = if self.kin.is_some() { vertex < node } else { pass > 0 };
-        steeper > ROUNDING || (steeper >= -ROUNDING && comes_later)
+        let comes_later = if self.own_facets.is_some() { vertex < node } else { pass > 0 };
+        steeper > ROUNDED_SHARE || (steeper >= -ROUNDED_SHARE && comes_later)
     }
 
     /// The normal of the projection of a node at p onto a facet, and the distance along it.
@@ -363,57 +365,5 @@ impl Stand {
         let other = self.seen.iter().copied().find(|seen| !same(seen)).flatten();
         let now = Seen { t, normal: next.normal, facet: next.facet };
         Some(Self { jumps: self.jumps.saturating_add(u8::from(jumped)), seen: [Some(now), other], ..next })
-    }
-
-    /// d²g/ds² along x + s v: the node at x has velocity v; the facet and the velocities of its vertices are given as
-    /// shapes.
-    ///
-    /// With r = g n from the closest point S(ξ) to the node and w the velocity of the node relative to the facet
-    /// there, differentiating r · S,α = 0 gives A ξ̇ = p − g c with p_α = w · S,α, c_α = n · w,α and A = S,α · S,β −
-    /// g n · S,αβ, and the rate of the normal ṅ · S,α = c − n · S,αβ ξ̇. Then g̈ = ṅ · w + n · w,α ξ̇. On a side or a
-    /// vertex the node also turns around it: w⊥²/g. If the gap is below a small share of the facet, that turn takes
-    /// almost no time and is left out; the facet then represents a smooth surface.
-    pub(crate) fn acceleration(&self, x: Point, v: Point, shape: &Shape, velocity: &Shape) -> f64 {
-        const CLOSE: f64 = 1e-3;
-        let n = self.normal;
-        let arm = add_scaled(x, -1.0, shape.point(&self.weights));
-        let w = add_scaled(v, -1.0, velocity.point(&self.weights));
-        let gap = dot(n, arm);
-        // The contribution of a straight line with the tangent s that turns at rate c.
-        let line = |s: Point, c: f64| c * (2.0 * dot(w, s) - gap * c) / dot(s, s);
-        match self.location {
-            Location::Vertex(_) if gap.abs() > CLOSE * shape.size() => {
-                let across = add_scaled(w, -dot(n, w), n);
-                dot(across, across) / gap
-            }
-            Location::Side(k) if gap.abs() > CLOSE * shape.size() => {
-                let s = shape.side(k);
-                let around = add_scaled(w, -dot(n, w), n);
-                let around = add_scaled(around, -dot(around, s) / dot(s, s), s);
-                dot(around, around) / gap + line(s, -dot(n, velocity.side(k)))
-            }
-            _ => {
-                let ([s, t], [s_rate, t_rate]) =
-                    (shape.tangents_at(&self.weights), velocity.tangents_at(&self.weights));
-                let c = [-dot(n, s_rate), -dot(n, t_rate)];
-                if shape.is_segment() {
-                    return line(s, c[0]);
-                }
-                let (p, twist) = ([dot(w, s), dot(w, t)], dot(n, shape.twist()));
-                let (ss, st, tt) = (dot(s, s), dot(s, t), dot(t, t));
-                let solve = |st: f64, b: [f64; 2]| {
-                    let determinant = ss * tt - st * st;
-                    [(tt * b[0] - st * b[1]) / determinant, (ss * b[1] - st * b[0]) / determinant]
-                };
-                // At a focus of a warped facet the closest point is not unique. The facet is taken as flat there.
-                let curved = st - gap * twist;
-                let convex = ss * tt - curved * curved > 1e-3 * (ss * tt - st * st);
-                let (curved, twist) = if convex { (curved, twist) } else { (st, 0.0) };
-                let slide = solve(curved, [p[0] - gap * c[0], p[1] - gap * c[1]]);
-                let along = solve(st, p);
-                let turn = [c[0] - twist * slide[1], c[1] - twist * slide[0]];
-                c[0] * slide[0] + c[1] * slide[1] + turn[0] * along[0] + turn[1] * along[1]
-            }
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! The facets that a node may be in contact with: lists kept over many steps, from an R*-tree of the facets' boxes.
 
 use super::shape::{Point, RIM, Shape, norm};
+use crate::rounding::rounding;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use std::ops::ControlFlow;
@@ -31,8 +32,7 @@ impl Bounds {
 
     #[inline]
     pub(crate) fn of_corners(shape: &Shape) -> Self {
-        let [lower, upper] = shape.bounds();
-        Self { lower, upper }
+        Self::of_points(shape.corners().iter().copied())
     }
 
     fn with(&self, other: &Self) -> Self {
@@ -63,8 +63,13 @@ impl Bounds {
     /// A bound of |x − y| for x in one box and y in the other.
     #[inline]
     pub(crate) fn farthest(&self, other: &Self) -> f64 {
-        let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
-        norm([one(0), one(1), one(2)])
+        norm(self.largest_differences(other))
+    }
+
+    /// The largest components of x − y for x in one box and y in the other, in either direction.
+    #[inline]
+    fn largest_differences(&self, other: &Self) -> Point {
+        std::array::from_fn(|i| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]))
     }
 
     #[inline]
@@ -77,11 +82,11 @@ impl Bounds {
         self.lower.iter().chain(&self.upper).fold(0.0, |largest, x| x.abs().max(largest))
     }
 
-    /// Largest component of x − y for x in one box and y in the other, in either direction.
+    /// The largest one of these components.
     #[inline]
     pub(crate) fn spread(&self, other: &Self) -> f64 {
-        let one = |i: usize| (self.upper[i] - other.lower[i]).max(other.upper[i] - self.lower[i]);
-        one(0).max(one(1)).max(one(2))
+        let [x, y, z] = self.largest_differences(other);
+        x.max(y).max(z)
     }
 }
 
@@ -95,35 +100,47 @@ pub(super) fn overhang_of(extent: f64) -> f64 {
     8.0 * RIM * extent
 }
 
-/// For each of some boxes, the facets whose boxes were within the range when the lists were built.
-#[derive(Debug, Default)]
-pub(crate) struct Neighborhood {
+/// Lists of entries, one after another.
+#[derive(Debug)]
+pub(crate) struct Lists<E> {
     starts: Vec<usize>,
-    facets: Vec<usize>,
+    entries: Vec<E>,
 }
 
-impl Neighborhood {
-    /// From lists in ascending order.
-    pub(crate) fn of_lists(lists: impl Iterator<Item = Vec<usize>>) -> Self {
-        let mut all = Self { starts: vec![0], facets: Vec::new() };
-        for list in lists {
-            all.facets.extend(list);
-            all.starts.push(all.facets.len());
-        }
-        all
+impl<E> Default for Lists<E> {
+    fn default() -> Self {
+        Self { starts: vec![0], entries: Vec::new() }
+    }
+}
+
+impl<E> Lists<E> {
+    pub(super) fn clear(&mut self) {
+        self.starts.truncate(1);
+        self.entries.clear();
     }
 
+    /// Appends a list; returns it.
+    pub(super) fn push(&mut self, list: impl IntoIterator<Item = E>) -> &mut [E] {
+        let start = self.entries.len();
+        self.entries.extend(list);
+        self.starts.push(self.entries.len());
+        &mut self.entries[start..]
+    }
+
+    /// The k-th list; empty if there is none.
+    pub(crate) fn of(&self, k: usize) -> &[E] {
+        self.starts.get(k..k + 2).map_or(&[], |range| &self.entries[range[0]..range[1]])
+    }
+}
+
+/// For each of some boxes, the facets whose boxes were within the range when the lists were built, in ascending order,
+/// so that results do not depend on the age of the lists.
+pub(crate) type Neighborhood = Lists<usize>;
+
+impl Neighborhood {
     /// Whether a facet is in the list of the k-th box.
     pub(crate) fn holds(&self, k: usize, facet: usize) -> bool {
         self.of(k).binary_search(&facet).is_ok()
-    }
-
-    /// Candidate facets for the k-th box, in ascending order, so that results do not depend on the age of the list.
-    pub(crate) fn of(&self, k: usize) -> &[usize] {
-        match self.starts.get(k..k + 2) {
-            Some(range) => &self.facets[range[0]..range[1]],
-            None => &[],
-        }
     }
 
     /// Rebuilds the list of the others within `range` of each box.
@@ -133,15 +150,8 @@ impl Neighborhood {
         others: impl Iterator<Item = Bounds>,
         range: f64,
     ) {
-        self.starts.clear();
-        self.facets.clear();
-        self.starts.push(0);
-        each_near(boxes, others, range, |found| {
-            let start = self.facets.len();
-            self.facets.extend_from_slice(found);
-            self.facets[start..].sort_unstable();
-            self.starts.push(self.facets.len());
-        });
+        self.clear();
+        each_near(boxes, others, range, |found| self.push(found.iter().copied()).sort_unstable());
     }
 }
 
@@ -154,8 +164,8 @@ pub(super) fn each_near(
 ) {
     let all = boxes.clone().reduce(|all, bounds| all.with(&bounds)).unwrap_or(Bounds::EMPTY);
     let leaves = others.enumerate().filter_map(|(index, bounds)| {
-        let rounding = 16.0 * f64::EPSILON * bounds.magnitude().max(all.magnitude());
-        let near = bounds.inflated(range + overhang(&bounds) + rounding);
+        let rounded = rounding(bounds.magnitude().max(all.magnitude()));
+        let near = bounds.inflated(range + overhang(&bounds) + rounded);
         let leaf = || GeomWithData::new(Rectangle::from_corners(near.lower, near.upper), index);
         near.intersects(&all).then(leaf)
     });

@@ -2,17 +2,11 @@
 
 use super::{Nodes, Point, add_scaled, norm};
 use crate::real::Real;
-use crate::rounding::time_resolution;
+use crate::rounding::{NEAR_SHARE, rounding, time_resolution};
 
 /// Time increment of the differences, as a share of the time ahead, as in `simulation/rows/rate_differences.rs` for
 /// `f64`.
 const SHARE: f64 = 1.0 / 16.0;
-
-/// Motion of the fastest node for a difference, as a share of the smallest facet, if the time ahead is not known.
-const WAY: f64 = 1e-3;
-
-/// Differences below this many roundings of the summands of a gap count as zero.
-const ROUNDINGS: f64 = 32.0;
 
 /// Gaps before, now and after, and the nodal positions for them.
 #[derive(Debug, Default)]
@@ -38,7 +32,7 @@ impl SecondDifference {
         let fastest = speeds.fold(0.0, f64::max);
         let step = match (ahead > 0.0, fastest > 0.0) {
             (true, _) => SHARE * ahead,
-            (false, true) => WAY * finest / fastest,
+            (false, true) => NEAR_SHARE * finest / fastest,
             (false, false) => 0.0,
         };
         // A time increment that is exact in t.
@@ -59,8 +53,7 @@ impl SecondDifference {
         for (row, ((before, now), after)) in before.iter().zip(now).zip(after).enumerate() {
             let change = (after - now) - (now - before);
             let most = before.abs().max(now.abs()).max(after.abs());
-            let rounded = ROUNDINGS * f64::EPSILON * (size + most);
-            act(row, if change.abs() > rounded { change / (delta * delta) } else { 0.0 });
+            act(row, if change.abs() > rounding(size + most) { change / (delta * delta) } else { 0.0 });
         }
     }
 }

@@ -46,8 +46,8 @@ const ON_QUADRILATERAL: &[[f64; 2]] =
 pub(crate) struct Whole {
     kind: Kind,
     /// Index of the part, and its number of nodes.
-    part: u8,
-    own: u8,
+    part: usize,
+    own: usize,
     /// The other nodes; the last one fills the rest of the array.
     others: [usize; 5],
 }
@@ -122,30 +122,26 @@ fn serendipity([a, b]: [f64; 2], [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
 
 impl Whole {
     /// A part of a facet of second order: its nodes, their number, and the link to the whole facet.
-    pub(super) fn part(kind: Kind, part: u8, nodes: &[usize]) -> ([usize; 4], usize, Self) {
-        let order = kind.orders()[usize::from(part)];
+    pub(super) fn part(kind: Kind, part: usize, nodes: &[usize]) -> ([usize; 4], usize, Self) {
+        let order = kind.orders()[part];
         let own = match (kind, part) {
             (Kind::Segment, _) => 2,
             (Kind::Triangle, _) | (Kind::Serendipity, 0..4) => 3,
             _ => 4,
         };
-        let (of_part, others) = order.split_at(usize::from(own));
+        let (of_part, others) = order.split_at(own);
         let fill = |places: &[usize], k: usize| nodes[places[k.min(places.len() - 1)]];
         let whole = Self { kind, part, own, others: std::array::from_fn(|k| fill(others, k)) };
-        (std::array::from_fn(|k| fill(of_part, k)), usize::from(own), whole)
+        (std::array::from_fn(|k| fill(of_part, k)), own, whole)
     }
 
     /// The nodes of the whole facet that are not nodes of the part.
     pub(super) fn others(&self) -> &[usize] {
-        &self.others[..self.order().len() - self.own()]
-    }
-
-    fn own(&self) -> usize {
-        usize::from(self.own)
+        &self.others[..self.order().len() - self.own]
     }
 
     fn order(&self) -> &'static [usize] {
-        self.kind.orders()[usize::from(self.part)]
+        self.kind.orders()[self.part]
     }
 
     /// The shares of the force on a node of the part that move to the other nodes if linear parts bear the pressure.
@@ -174,7 +170,7 @@ impl Whole {
 
     /// Natural coordinates of the point of the part with these shape functions.
     fn place(&self, weights: &[f64; 4]) -> [f64; 2] {
-        let corners = &self.order()[..self.own()];
+        let corners = &self.order()[..self.own];
         corners.iter().zip(weights).fold([0.0; 2], |sum, (&corner, weight)| {
             let at = self.kind.coordinates()[corner];
             [sum[0] + weight * at[0], sum[1] + weight * at[1]]
@@ -194,7 +190,7 @@ impl Whole {
     /// Its shape functions less the ones of the part. They are zero at all nodes, and their sum is zero.
     pub(crate) fn excess(&self, weights: &[f64; 4]) -> ByNode {
         let mut excess = self.shapes(weights);
-        excess.iter_mut().zip(&weights[..self.own()]).for_each(|(shape, weight)| *shape -= weight);
+        excess.iter_mut().zip(&weights[..self.own]).for_each(|(shape, weight)| *shape -= weight);
         excess
     }
 
@@ -209,7 +205,7 @@ impl Whole {
                 let (_, [along, across]) = self.kind.shape(place, at);
                 *slope = first * along + second * across;
             }
-            slopes.iter_mut().zip(&by[..self.own()]).for_each(|(slope, by)| *slope -= by);
+            slopes.iter_mut().zip(&by[..self.own]).for_each(|(slope, by)| *slope -= by);
         }
         slopes
     }
@@ -253,7 +249,7 @@ mod tests {
         for (kind, count) in KINDS {
             let nodes: Vec<usize> = (10..10 + count).collect();
             let mut covered = 0.0;
-            for part in (0_u8..).take(kind.orders().len()) {
+            for part in 0..kind.orders().len() {
                 let (own, corners, whole) = Whole::part(kind, part, &nodes);
                 let mut all: Vec<usize> = own[..corners].iter().chain(whole.others()).copied().collect();
                 all.sort_unstable();

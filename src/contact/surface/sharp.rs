@@ -9,23 +9,27 @@ impl Surface {
     pub(crate) fn sharp_nodes(&self, angle: f64, positions: &[Point]) -> Vec<usize> {
         let mut sharp = Vec::new();
         for (index, facet) in self.facets().iter().enumerate() {
-            let (shape, nodes) = (facet.shape(positions), facet.nodes());
+            let nodes = facet.nodes();
             for (side, &first) in nodes.iter().enumerate() {
-                let Some((other, across)) = self.neighbor(index, side) else { continue };
-                let second = nodes[(side + 1) % nodes.len()];
-                let other = self.facets()[other].shape(positions);
-                let normals = [shape.normal(&shape.on_side(side, 0.5)), other.normal(&other.on_side(across, 0.5))];
-                let [Some(own), Some(across)] = normals else { continue };
-                let turn = norm(cross(own, across)).atan2(dot(own, across));
-                let below = sub(other.middle(), positions[first]);
-                if turn > angle && dot(own, below) < 0.0 {
+                if self.turn(index, side, positions).is_some_and(|turn| turn > angle) {
                     sharp.push(first);
-                    sharp.extend((nodes.len() > 2).then_some(second));
+                    sharp.extend((nodes.len() > 2).then_some(nodes[(side + 1) % nodes.len()]));
                 }
             }
         }
         sharp.sort_unstable();
         sharp.dedup();
         sharp
+    }
+
+    /// The angle by which the surface turns across the middle of a side, positive where it is convex; none where the
+    /// surface ends, or where a normal is not defined.
+    pub(crate) fn turn(&self, facet: usize, side: usize, positions: &[Point]) -> Option<f64> {
+        let (other, across) = self.neighbor(facet, side)?;
+        let [shape, other] = [facet, other].map(|facet| self.facets()[facet].shape(positions));
+        let own = shape.normal(&shape.on_side(side, 0.5))?;
+        let normal = other.normal(&other.on_side(across, 0.5))?;
+        let turn = norm(cross(own, normal)).atan2(dot(own, normal));
+        Some(if dot(own, sub(other.middle(), shape.corner(side))) < 0.0 { turn } else { -turn })
     }
 }

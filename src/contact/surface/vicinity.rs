@@ -2,9 +2,9 @@
 //! contact.
 
 use super::Surface;
-use super::kin::Kin;
 use super::material::{Material, near};
 use super::offsets::Thickness;
+use super::own_facets::{OwnFacets, around};
 use super::reach::Reach;
 use super::shape::Point;
 use crate::contact::SurfaceSettings;
@@ -16,7 +16,7 @@ pub(crate) struct Vicinity {
     pub(crate) reach: Reach,
     pub(crate) thickness: Thickness,
     /// For a surface against itself, the facets excluded for each node; none before they are needed.
-    pub(crate) kin: Option<Kin>,
+    pub(crate) own_facets: Option<OwnFacets>,
     /// The material behind both surfaces (one entry for a surface against itself); empty before it is needed.
     pub(crate) material: Vec<Material>,
     /// For a surface against itself, the number of rings of facets around a node that are excluded.
@@ -38,7 +38,7 @@ impl Vicinity {
         Ok(Self {
             reach: Reach::new(reach, skin.map(|skin| skin.value())),
             thickness: Thickness::new(offsets.as_deref().unwrap_or_default(), ramp.unwrap_or_default()),
-            kin: None,
+            own_facets: None,
             material: Vec::new(),
             rings: of_itself.then_some(rings.unwrap_or(1)),
         })
@@ -58,7 +58,7 @@ impl Vicinity {
         for surface in &surfaces[..if self.is_of_itself() { 1 } else { surfaces.len() }] {
             let near = near(surface, coordinates, known.0);
             self.material.push(Material::new(surface, &near, coordinates, known));
-            self.kin = self.rings.map(|rings| Kin::new(surface, rings, near));
+            self.own_facets = self.rings.map(|rings| OwnFacets { adjacent: around(surface, rings), nearby: near });
         }
     }
 
@@ -76,7 +76,7 @@ impl Vicinity {
     /// Drops all lists that depend on the settings.
     pub(crate) fn forget(&mut self) {
         self.reach.forget();
-        self.kin = None;
+        self.own_facets = None;
         self.material.clear();
     }
 }
