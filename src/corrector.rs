@@ -28,6 +28,7 @@ pub use nonsmooth_splitting::NonsmoothSplitting;
 pub use persistency::{HistoryProjection, Parts, PersistencyCorrection};
 pub use prediction::{Extent, Prediction};
 pub use release::{Release, TaylorPapadopoulos};
+pub(crate) use switching::Switching;
 pub use work_balance::WorkBalance;
 pub use zero_acceleration::ZeroAcceleration;
 

@@ -1,6 +1,8 @@
-//! What most programs use of this crate in double precision, compiled with the crate in builds without optimization:
-//! programs then link these functions instead of compiling the generic code once more in each of them. (The compiler
-//! shares generic functions between crates at optimization levels 0 and 1 only.)
+//! What most programs use of this crate in double precision, compiled with the crate under `--cfg shared_instances`.
+//!
+//! The repository sets it in `.cargo/config.toml`: its tests, examples and benches then link these functions instead of
+//! compiling the generic code once more in each of them. Hosts do not compile this file. (The compiler shares generic
+//! functions between crates at optimization levels 0 and 1 only.)
 
 use crate::contact::{Capsule, Cone, Cuboid, Cylinder, GapFunction, Obstacle, Plane, Sphere};
 #[cfg(feature = "mesh-contact")]

@@ -15,7 +15,7 @@ pub mod contact_solver;
 pub mod corrector;
 mod dense;
 mod error;
-#[cfg(all(debug_assertions, not(test)))]
+#[cfg(all(shared_instances, not(test)))]
 mod instances;
 pub mod integrator;
 mod kernels;
@@ -44,7 +44,7 @@ pub use contact_solver::{ActiveSet, ContactSolver};
 pub use corrector::{Corrector, JumpProjection, PersistencyCorrection};
 pub use error::{Error, Result};
 pub use faer;
-#[cfg(all(debug_assertions, not(test)))]
+#[cfg(all(shared_instances, not(test)))]
 #[doc(hidden)]
 pub use instances::instances;
 pub use integrator::*;

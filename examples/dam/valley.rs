@@ -68,6 +68,11 @@ const fn way(boundary: Boundary, modes: usize) -> Way {
     Way { boundary, softening: None, modes, scheme }
 }
 
+/// Untapered, by the trapezoidal rule all the same.
+const fn undamped(modes: usize) -> Way {
+    Way { scheme: Scheme::Trapezoidal, ..way(Untapered, modes) }
+}
+
 /// Tapered, and statically exact.
 const fn unsoftened(modes: usize) -> Way {
     Way { softening: Some(0.0), ..way(Tapered, modes) }
@@ -79,14 +84,14 @@ impl Plan {
         cells: [1, 2, 4],
         step: 0.02,
         steps: 80,
-        reduced: &[way(Tapered, 10), unsoftened(10), way(Untapered, 10), way(CraigBampton, 10)],
+        reduced: &[way(Tapered, 10), unsoftened(10), way(Untapered, 10), undamped(10), way(CraigBampton, 10)],
         friction: 0.0,
     };
     pub(crate) const FULL: Self = Self {
         cells: [2, 6, 16],
         step: 0.0125,
         steps: 240,
-        reduced: &[way(Tapered, 30), unsoftened(30), way(Untapered, 30), way(CraigBampton, 30)],
+        reduced: &[way(Tapered, 30), unsoftened(30), way(Untapered, 30), undamped(30), way(CraigBampton, 30)],
         ..Self::QUICK
     };
 

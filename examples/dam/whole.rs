@@ -117,7 +117,10 @@ pub(crate) fn reduced(dam: &Dam, loading: &Loading, plan: &Plan, way: Way) -> Re
     let Way { boundary, softening, modes, scheme } = way;
     let has_mass = boundary == Boundary::CraigBampton;
     let softened = softening.map_or(String::new(), |softening| format!(", softening {softening}"));
-    let name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
+    let mut name = format!("{}{softened}, {modes} modes a block", Model::Reduced(boundary).name());
+    if !has_mass && scheme == Scheme::Trapezoidal {
+        name += ", trapezoidal rule";
+    }
     let mut record = Record::of(&name, dam, plan.steps, || {
         let (mut blocks, mut firsts, mut loads) = (Blocks::new(), Vec::new(), [const { Vec::new() }; 4]);
         for block in &dam.blocks {

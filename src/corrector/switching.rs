@@ -1,4 +1,5 @@
-//! Contacts on dofs without mass that close or open in a step, and the impulses that return their work.
+//! Contacts on dofs without mass that close or open in a step: the reduction of their mean forces, and the impulses
+//! that return the remaining work.
 
 use crate::real::Real;
 use crate::state::ContactState;
@@ -10,6 +11,8 @@ pub(crate) struct Switching<T> {
     /// Gaps and raw multipliers at the start of the stage, one entry per candidate; `None` if no corrector needs
     /// them.
     pub(super) start: Option<[Vec<T>; 2]>,
+    /// Reductions of the mean contact forces in this stage, one per row.
+    pub(super) excess: Vec<Excess<T>>,
     /// Rows that have closed or opened in this stage.
     pub(super) rows: Vec<usize>,
     /// Contacts that have closed or opened in this step.
@@ -18,6 +21,19 @@ pub(crate) struct Switching<T> {
     pub(super) change: Vec<T>,
     pub(super) momentum: Vec<T>,
 }
+
+/// The part of the mean force that a contact does not exert over a stage, and the work that it thereby does not do.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Excess<T> {
+    pub(crate) force: T,
+    pub(crate) work: T,
+    /// Error of the force before its last change.
+    miss: T,
+}
+
+/// Bounds of the fraction of a miss by which an excess may change.
+const SMALLEST_PART: f64 = 0.05;
+const LARGEST_PART: f64 = 4.0;
 
 /// Largest number of tangential rows of a contact.
 const TANGENTS: usize = 2;
@@ -28,21 +44,25 @@ pub(super) struct Switch<T> {
     pub(super) row: usize,
     /// Largest impulse that the contact may have exerted in excess.
     pub(super) most: T,
+    /// Largest impulse that the contact may have exerted too little, because its force was already reduced.
+    pub(super) least: T,
     /// Friction divided by the normal force; it acts as long as the normal force does.
     friction: [T; TANGENTS],
     /// The impulse J that returns the work taken by the contact, and the energy that this impulse alone returns.
     pub(super) impulse: T,
     pub(super) returned: T,
+    /// Work of the corresponding friction impulse.
+    pub(super) by_friction: T,
 }
 
 impl<T: Real> Switch<T> {
     /// A contact that has closed or opened, with the ratio of its friction to its normal force.
-    pub(super) fn new(row: usize, most: T, along: impl Iterator<Item = T>) -> Self {
+    pub(super) fn new(row: usize, [most, least]: [T; 2], along: impl Iterator<Item = T>) -> Self {
         let mut friction = [T::zero(); TANGENTS];
         for (share, own) in friction.iter_mut().zip(along) {
             *share = own;
         }
-        Self { row, most, friction, impulse: T::zero(), returned: T::zero() }
+        Self { row, most, least, friction, impulse: T::zero(), returned: T::zero(), by_friction: T::zero() }
     }
 
     /// J along the normal row, and the friction impulses along the tangential rows.
@@ -60,6 +80,7 @@ impl<T: Real> Switching<T> {
         let rows = if dofs.is_some() { rows } else { 0 };
         Self {
             start: dofs.map(|_| [Vec::with_capacity(rows), Vec::with_capacity(rows)]),
+            excess: Vec::with_capacity(rows),
             rows: Vec::with_capacity(rows),
             switches: Vec::with_capacity(2 * rows),
             change: vector(),
@@ -73,6 +94,7 @@ impl<T: Real> Switching<T> {
         for values in start {
             values.reserve(rows.saturating_sub(values.len()));
         }
+        self.excess.reserve(rows.saturating_sub(self.excess.len()));
         self.rows.reserve(rows.saturating_sub(self.rows.len()));
         self.switches.reserve((2 * rows).saturating_sub(self.switches.len()));
     }
@@ -87,10 +109,85 @@ impl<T: Real> Switching<T> {
         let Some([gaps, forces]) = &mut self.start else { return };
         gaps.clone_from(&contacts.gap);
         forces.clone_from(&contacts.lambda_raw);
+        self.excess.clear();
+        self.excess.resize(contacts.gap.len(), Excess::default());
         self.rows.clear();
         if is_first {
             self.switches.clear();
         }
+    }
+
+    /// The gap of a row at the start of the stage.
+    pub(crate) fn gap(&self, row: usize) -> T {
+        self.start.as_ref().map_or(T::zero(), |[gaps, _]| gaps[row])
+    }
+
+    /// The force of a row at the start and at the end of the stage, and the reduction of their mean.
+    pub(crate) fn forces(&mut self, row: usize, contacts: &ContactState<T>) -> (T, T, &mut Excess<T>) {
+        let before = self.start.as_ref().map_or(T::zero(), |[_, forces]| forces[row]);
+        (before, contacts.lambda_raw[row], &mut self.excess[row])
+    }
+
+    /// Whether a row closes or opens in the stage, or has a reduced force.
+    pub(crate) fn switches(&self, contacts: &ContactState<T>) -> bool {
+        let Some([_, forces]) = &self.start else { return false };
+        let mut rows = self.excess.iter().zip(forces).zip(&contacts.lambda_raw);
+        rows.any(|((excess, &before), &after)| excess.force != T::zero() || (before > T::zero()) != (after > T::zero()))
+    }
+
+    /// Adds a fraction of each row's miss to its excess: one half in the first iteration (`before` is `None`), then
+    /// the factor of Irons and Tuck (Int. J. Numer. Meth. Eng. 1, 1969) from the last fraction. A reduced force lets
+    /// an opening contact open farther, so that it needs a smaller reduction; it lets a closing contact penetrate
+    /// deeper, so that it needs a larger one. Returns the fraction.
+    pub(crate) fn move_excess(&mut self, misses: &[T], before: Option<T>) -> T {
+        let mut part = T::of(0.5);
+        if let Some(before) = before {
+            let (mut along, mut square) = (T::zero(), T::zero());
+            for (excess, &miss) in self.excess.iter().zip(misses) {
+                let change = miss - excess.miss;
+                along += excess.miss * change;
+                square += change * change;
+            }
+            part = (before * along / square).abs().min(T::of(LARGEST_PART)).max(T::of(SMALLEST_PART));
+        }
+        for (excess, &miss) in self.excess.iter_mut().zip(misses) {
+            excess.force += part * miss;
+            excess.miss = miss;
+        }
+        part
+    }
+
+    /// Removes all reductions, so that all rows exert their full forces.
+    pub(crate) fn forget_excess(&mut self) {
+        self.excess.fill(Excess::default());
+    }
+
+    /// Force reductions of all rows, with the corresponding friction.
+    pub(crate) fn excess_forces<'s>(&'s self, contacts: &'s ContactState<T>) -> impl Iterator<Item = (usize, T)> + 's {
+        let rows = self.excess.iter().enumerate().filter(|(_, excess)| excess.force != T::zero());
+        rows.flat_map(move |(row, excess)| {
+            let after = &contacts.lambda_raw;
+            let all = match &self.start {
+                Some([_, before]) if after[row] <= T::zero() => before,
+                _ => after,
+            };
+            // A row whose force has become zero has no friction either.
+            let share = if all[row] > T::zero() { excess.force / all[row] } else { T::zero() };
+            let along = contacts.tangents.of(row).map(move |tangent| (tangent, share * all[tangent]));
+            std::iter::once((row, excess.force)).chain(along)
+        })
+    }
+
+    /// Subtracts the impulses of the force reductions over a time, and books the work that they return.
+    pub(crate) fn book_excess(&self, time: T, contacts: &mut ContactState<T>) {
+        for (row, excess) in self.excess.iter().enumerate() {
+            contacts.dissipated[row] += excess.work;
+        }
+        let mut impulses = std::mem::take(&mut contacts.impulse);
+        for (row, force) in self.excess_forces(contacts) {
+            impulses[row] -= time * force;
+        }
+        contacts.impulse = impulses;
     }
 
     /// Checks a row on dofs without mass after the contact problem of a stage: stores it if it has closed or opened.

@@ -6,8 +6,10 @@
 //! - `massless`, `massless_step`: dofs without mass of explicit stages.
 //! - `linear`, or `newton_step` with the settings in `newton` and the force in `path`: solve the stage.
 //! - `contact`: solves its contact.
+//! - `excess_forces`: contacts on dofs without mass that exert a force for a part of the stage.
 
 pub(super) mod contact;
+pub(super) mod excess_forces;
 pub(super) mod linear;
 pub(super) mod massless;
 pub(super) mod massless_step;

@@ -470,7 +470,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let size = ContactSize::new(rows, &g, &constraints);
         let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
         let follower = follows.then(|| scheme.integrator.name());
-        work.keep_massless(massless, (&mut *system, together), follower, &state.motion, interface)?;
+        work.keep_massless(massless, (&mut *system, together), (&program, follower), &state.motion, interface)?;
         work.newton = newton(settings.newton, &mut *system, &scheme, &program, &state.motion)?;
         work.rates = scheme.rates(&state.motion);
         work.stiffening = (settings.checks_stability && together.is_alone())

@@ -137,6 +137,14 @@ impl<T: Real> ScaledRows<T> {
         self.0[field].terms.iter().any(Term::is_difference)
     }
 
+    /// The coefficients of a past acceleration in u and v.
+    pub(crate) fn shares_of_acceleration(&self, state: usize) -> [T; 2] {
+        [0, 1].map(|field| {
+            let term = self.0[field].terms.iter().find(|term| (term.state, term.field) == (state, 2));
+            term.map_or(T::zero(), |term| term.c)
+        })
+    }
+
     /// Writes the parts that come from the past, block by block; fields without a term are left as they are.
     pub(crate) fn predict(&self, past: &[Motion<T>], outputs: &mut [&mut [T]; 3]) {
         for block in blocks(outputs[0].len()) {

@@ -12,6 +12,7 @@ use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::contact_rows::ContactRowsWork;
 use crate::simulation::run::impulses::Impulses;
 use crate::simulation::stage::contact::ContactWork;
+use crate::simulation::stage::excess_forces::ExcessForces;
 use crate::simulation::stage::massless::{MasslessBlock, is_damped};
 use crate::simulation::stage::newton::NewtonWork;
 use crate::simulation::stage::supports::Supports;
@@ -31,6 +32,8 @@ pub(crate) struct Workspace<T: Real> {
     pub(crate) massless: Vec<usize>,
     /// For explicit schemes, if there are dofs without mass.
     pub(crate) block: Option<MasslessBlock<T>>,
+    /// For implicit schemes, if the work of contacts on dofs without mass is balanced.
+    pub(crate) excess: Option<Box<ExcessForces<T>>>,
     pub(crate) correction: CorrectionWork<T>,
     pub(crate) rate_check: RateCheck<T>,
     /// For schemes with a stability limit that may be reached in the run.
@@ -115,6 +118,7 @@ impl<T: Real> Workspace<T> {
             newton: None,
             massless: Vec::new(),
             block: None,
+            excess: None,
             correction: CorrectionWork {
                 buffers: Buffers::new(rows, [damped, room(effects.predicts)], balances.then_some(dofs)),
                 projection: (may_press && !correctors.is_empty()).then_some(projection),
@@ -135,13 +139,15 @@ impl<T: Real> Workspace<T> {
         &mut self,
         massless: Vec<usize>,
         (system, together): (&mut dyn System<T>, &Together<T>),
-        follower: Option<String>,
+        (program, follower): (&Program<T>, Option<String>),
         at: &Motion<T>,
         interface: &[usize],
     ) -> Result<()> {
         if let Some(name) = follower {
             self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
             self.contact.rows.massless.acts = vec![false; self.rows];
+        } else if self.correction.buffers.switching.is_on() && self.correction.buffers.shifted.is_empty() {
+            self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
         }
         let buffers = &mut self.correction.buffers;
         if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
@@ -168,6 +174,9 @@ impl<T: Real> Workspace<T> {
             flags.reserve(rows.saturating_sub(flags.len()));
         }
         self.correction.buffers.make_room(rows);
+        if let Some(excess) = &mut self.excess {
+            excess.make_room(rows);
+        }
         self.rate_check.make_room(rows);
     }
 }

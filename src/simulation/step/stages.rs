@@ -45,13 +45,21 @@ impl<T: Real> Simulation<'_, T> {
                 vectors: &mut work.vectors,
                 contact: &mut work.contact,
             };
-            let Workspace { correction, massless, newton, block, backup, .. } = work;
+            let Workspace { correction, excess, massless, newton, block, backup, .. } = work;
 
             solve.predict()?;
             predict_corrections(&mut solve, correction, correctors, massless, place == 0)?;
+            if let Some(excess) = excess {
+                excess.begin(place == 0);
+                excess.shift(stage, clock.h, solve.new);
+            }
             solve.contact.rows.read_start(solve.constraints, solve.g, solve.past, clock.h)?;
 
             solve.solve(newton.as_deref_mut(), block.as_mut())?;
+            if let (Some(excess), Some(projection)) = (&mut *excess, &mut correction.projection) {
+                let switching = &mut *correction.buffers.switching;
+                correction.energy += excess.solve_again(&mut solve, switching, projection)?;
+            }
 
             solve.set_support_accelerations();
             solve.set_massless_rates(place, history.made_with, &history.slopes);
@@ -62,6 +70,9 @@ impl<T: Real> Simulation<'_, T> {
             let impulse_weight = impulse_weight(stage.response, covector);
             let booking = Booking { impulse_weight, is_first: place == 0, is_last: place + 1 == stages };
             solve.close(&booking, &mut correction.buffers)?;
+            if let Some(excess) = excess {
+                excess.book(stage, clock.h, &correction.buffers.switching, &mut solve.contact.trial);
+            }
 
             let scheme = numbers(stage, clock.h, covector, [place, stages]);
             correct(solve, scheme, correctors, Corrected { correction, block: block.as_mut(), massless, backup })?;
