@@ -158,7 +158,7 @@ pub struct Effects {
 impl Effects {
     /// The effects of several correctors together.
     pub(crate) fn of_all<T: Real>(correctors: &[Box<dyn Corrector<T> + '_>]) -> Self {
-        correctors.iter().map(|corrector| corrector.effects()).fold(Self::default(), |all, own| Self {
+        correctors.iter().map(Corrector::effects).fold(Self::default(), |all, own| Self {
             edits: all.edits.max(own.edits),
             leaves_smooth_motion: all.leaves_smooth_motion || own.leaves_smooth_motion,
             corrects_massless: all.corrects_massless || own.corrects_massless,

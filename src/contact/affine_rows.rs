@@ -18,7 +18,7 @@ pub(super) fn set_friction<T: Real>(
     contact: &mut Contact<'_, T>,
     coefficient: f64,
     (nodes, normal): (&Nodes, Point),
-    shares: impl Iterator<Item = (usize, f64)> + Clone,
+    shares: &(impl Iterator<Item = (usize, f64)> + Clone),
 ) {
     if coefficient == 0.0 {
         return;

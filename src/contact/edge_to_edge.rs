@@ -357,7 +357,7 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
             contact.recovery(T::of(pair.recovery()));
             let (coefficient, shares) =
                 (self.settings.given_friction(), pair.nodes().into_iter().zip(crossing.weights()));
-            set_friction(&mut contact, coefficient, (&self.nodes, crossing.normal), shares);
+            set_friction(&mut contact, coefficient, (&self.nodes, crossing.normal), &shares);
         }
     }
 

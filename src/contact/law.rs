@@ -269,12 +269,10 @@ impl ContactLaw {
 
     /// Whether the force is a function of the gap (and its derivatives): the gap may be negative.
     pub fn is_compliant(&self) -> bool {
-        match self {
-            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch => {
-                false
-            }
-            _ => true,
-        }
+        !matches!(
+            self,
+            Self::Rigid | Self::Equality | Self::Restitution { .. } | Self::RateCondition | Self::PersistencySwitch
+        )
     }
 
     /// Whether the force depends on the rate of the gap.
@@ -343,14 +341,14 @@ impl ContactLaw {
     /// Whether the contact may have friction, bounded by μ times the force of the law. Not for laws whose force may
     /// pull, or does not belong to a single instant.
     pub(crate) fn admits_friction(&self) -> bool {
-        match self {
+        !matches!(
+            self,
             Self::Equality
-            | Self::RateCondition
-            | Self::PersistencySwitch
-            | Self::Bipenalty { .. }
-            | Self::StabilizedBipenalty { .. } => false,
-            _ => true,
-        }
+                | Self::RateCondition
+                | Self::PersistencySwitch
+                | Self::Bipenalty { .. }
+                | Self::StabilizedBipenalty { .. }
+        )
     }
 
     /// Whether a compliant law reads the gap that the scheme constrains ahead of the state, besides the gaps of the

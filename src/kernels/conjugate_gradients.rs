@@ -280,13 +280,15 @@ fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
     let mut ends = [ends; W];
     let mut outcomes = iterate::<T, B, W>(&lower, &mut ends, [x, r, p, t, y]);
     let mut lengths = [0.0; W];
-    x.iter().for_each(|x| accumulate(x, x, &mut lengths));
+    for x in &*x {
+        accumulate(x, x, &mut lengths);
+    }
     for l in 0..W {
         let Outcome::Converged { iterations: 1.. } = outcomes[l] else { continue };
         // xᵀAx over xᵀdiag(A)x is at least the smallest eigenvalue. Below the rounding of the entries of A the matrix
         // is singular to working precision; so it is if the solution overflows.
         let curvature = ends[l].length / lengths[l];
-        if !(curvature > rounding(T::one()).value()) {
+        if curvature.is_nan() || curvature <= rounding(T::one()).value() {
             let curvature = if curvature.is_nan() { 0.0 } else { curvature };
             outcomes[l] = Outcome::Indefinite { curvature, dof: place_of_largest(x, l) };
         }
@@ -352,15 +354,16 @@ fn iterate<T: Scalar, const B: usize, const W: usize>(
             if outcomes[l].is_some() {
                 continue;
             }
-            match curvature[l] > 0.0 && curvature[l].is_finite() {
-                true => steps[l] = rho[l] / curvature[l],
-                false => {
-                    let mut length = [0.0; W];
-                    t.iter().for_each(|t| accumulate(t, t, &mut length));
-                    let curvature = curvature[l] / length[l];
-                    let curvature = if curvature.is_nan() { 0.0 } else { curvature };
-                    outcomes[l] = Some(Outcome::Indefinite { curvature, dof: place_of_largest(t, l) });
+            if curvature[l] > 0.0 && curvature[l].is_finite() {
+                steps[l] = rho[l] / curvature[l];
+            } else {
+                let mut length = [0.0; W];
+                for t in &*t {
+                    accumulate(t, t, &mut length);
                 }
+                let curvature = curvature[l] / length[l];
+                let curvature = if curvature.is_nan() { 0.0 } else { curvature };
+                outcomes[l] = Some(Outcome::Indefinite { curvature, dof: place_of_largest(t, l) });
             }
         }
         let (alpha, before) = (steps.map(T::of), rho);

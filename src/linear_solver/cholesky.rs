@@ -176,6 +176,7 @@ struct Factor<T: Real> {
 }
 
 /// How the factor is computed and swept.
+#[expect(clippy::large_enum_variant, reason = "one of them a factor")]
 enum Method<T> {
     /// A simplicial L D Lᵀ, with the scratch of its factorization.
     Simplicial(Option<MemBuffer>),

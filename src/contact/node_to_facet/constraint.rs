@@ -25,7 +25,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
             let vertices = surface.facets()[stand.facet].nodes().iter().zip(stand.weights);
             let shares = std::iter::once((node, 1.0)).chain(vertices.map(|(&vertex, weight)| (vertex, -weight)));
             let coefficient = self.settings.given_friction();
-            set_friction(&mut contact, coefficient, (&self.nodes, stand.normal), shares);
+            set_friction(&mut contact, coefficient, (&self.nodes, stand.normal), &shares);
         }
     }
 

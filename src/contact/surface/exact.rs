@@ -89,7 +89,9 @@ impl RulePoints {
         let multipliers = solve(gram, missing);
         let change = |point: &RulePoint| functions(point).iter().zip(multipliers).map(|(f, by)| f * by).sum::<f64>();
         if points.iter().all(|point| change(point).abs() < MOST_CHANGE) {
-            points.iter_mut().for_each(|point| point.weight *= 1.0 + change(point));
+            for point in points.iter_mut() {
+                point.weight *= 1.0 + change(point);
+            }
         }
     }
 }

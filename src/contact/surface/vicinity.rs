@@ -34,9 +34,9 @@ impl Vicinity {
     ) -> Result<Self> {
         settings.check(nodes)?;
         let SurfaceSettings { reach, skin, offsets, ramp, rings, .. } = settings;
-        let reach = reach.map_or(typical, |reach| reach.value());
+        let reach = reach.map_or(typical, T::value);
         Ok(Self {
-            reach: Reach::new(reach, skin.map(|skin| skin.value())),
+            reach: Reach::new(reach, skin.map(T::value)),
             thickness: Thickness::new(offsets.as_deref().unwrap_or_default(), ramp.unwrap_or_default()),
             own_facets: None,
             material: Vec::new(),

@@ -390,6 +390,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         Ok(Self { system, linear_solver, ..self })
     }
 
+    #[expect(clippy::too_many_lines, reason = "the parts of a run, one after the other")]
     fn build_together(self, together: &Together<T>) -> Result<Simulation<'a, T>> {
         let Self { mut system, integrator, h, constraints, mut contact_solver, settings, .. } = self;
         let InitialState { t, u, v, overclosure, is_at_rest } = self.initial;
@@ -442,7 +443,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
                 together,
                 h,
                 massless: &massless,
-                origin: Origin::Initial { overclosure: overclosure, is_at_rest: is_at_rest },
+                origin: Origin::Initial { overclosure, is_at_rest },
                 is_smooth,
             };
             start.begin(Motion { t, a: vec![T::zero(); dofs], u, v })?

@@ -17,12 +17,12 @@ pub(crate) struct ListedCorrector {
 
 impl ListedCorrector {
     pub(crate) fn list<T: Real>(correctors: &[Box<dyn Corrector<T> + '_>], tableau: &Tableau) -> Vec<Self> {
-        let listed = |corrector: &Box<dyn Corrector<T> + '_>| Self {
+        let listed = |corrector: &dyn Corrector<T>| Self {
             name: corrector.name(),
             requirements: corrector.requirements(tableau),
             effects: corrector.effects(),
         };
-        correctors.iter().map(listed).collect()
+        correctors.iter().map(|corrector| listed(&**corrector)).collect()
     }
 }
 
@@ -168,7 +168,7 @@ fn stage_refusals(stage: &Stage, is_corrected: bool) -> impl Iterator<Item = (fn
             "its displacements do not contain the unknown, so a multiplier cannot close a gap; choose a compliant law"
         }
     });
-    let restitution = (!on_velocity && !(is_position && is_corrected)).then_some(match is_position {
+    let restitution = (!(on_velocity || is_position && is_corrected)).then_some(match is_position {
         true => {
             "it imposes contact on displacements, and contacts leave by a correction of velocities: choose \
              `PersistencyCorrection::with_history_projection`"
@@ -192,7 +192,7 @@ fn stage_refusals(stage: &Stage, is_corrected: bool) -> impl Iterator<Item = (fn
         "its velocities do not contain the unknown, so a multiplier cannot hold the rate of a closed contact; choose \
          another contact law",
     );
-    let refusals: [(fn(ContactLaw) -> bool, Option<&'static str>); 4] = [
+    let refusals: [(Concerns, Option<&'static str>); 4] = [
         (|law| law.needs_multiplier(), rigid),
         (rebounds, restitution),
         (|law| law.reads_start(), start),
@@ -201,8 +201,11 @@ fn stage_refusals(stage: &Stage, is_corrected: bool) -> impl Iterator<Item = (fn
     refusals.into_iter().filter_map(|(concerns, reason)| Some((concerns, reason?)))
 }
 
+/// Whether a refusal concerns a law.
+type Concerns = fn(ContactLaw) -> bool;
+
 /// Why laws on a predicted gap are refused, if they are.
-fn prediction(tableau: &Tableau) -> Option<(fn(ContactLaw) -> bool, &'static str)> {
+fn prediction(tableau: &Tableau) -> Option<(Concerns, &'static str)> {
     let predicts = |contact| matches!(contact, ContactLevel::Position { .. }) && contact.lead() > 0.0;
     let refuses = tableau.stages.len() > 1 || !tableau.stages.iter().all(|stage| predicts(stage.contact));
     let reason = "it does not impose contact on the displacements of the step ahead, which the stabilized bipenalty \

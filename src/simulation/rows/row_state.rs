@@ -58,13 +58,13 @@ pub(crate) fn decide_measures<T: Real>(rows: &mut ContactRowsWork<T>, constraint
         return;
     }
     let ContactRowsWork { y, start, .. } = rows;
-    for row in 0..constraints.len() {
+    for (row, &y) in y.iter().enumerate().take(constraints.len()) {
         if start.measure[row] != Measure::Undecided {
             continue;
         }
         // The gap of a resting contact is small compared with the displacement that its force prevents, from the gap
         // at the start to the gap of the free motion.
-        let closed = start.gap[row] <= start.tolerance[row] + touching((y[row] - start.gap[row]).abs());
+        let closed = start.gap[row] <= start.tolerance[row] + touching((y - start.gap[row]).abs());
         start.measure[row] = constraints.law(row).measure(closed);
     }
 }

@@ -137,7 +137,9 @@ impl<T: Real> Start<'_, '_, T> {
         let known = contacts.lambda.clone();
         let mut all = Vec::new();
         self.constraints.tangents().expand(rows.iter().copied(), &mut all);
-        all.iter().for_each(|&row| contacts.lambda[row] = T::zero());
+        for &row in &all {
+            contacts.lambda[row] = T::zero();
+        }
         match self.balance(Unknown::Velocities { rows: &rows }, &damped, motion, contacts)? {
             Some(Balanced { forces, .. }) => all.into_iter().for_each(|row| contacts.lambda[row] = forces[row]),
             None => contacts.lambda = known,
@@ -151,10 +153,10 @@ impl<T: Real> Start<'_, '_, T> {
             return Ok(());
         }
         let rates = self.rates(motion.t, motion)?;
-        for row in 0..self.constraints.len() {
+        for (row, rates) in rates.iter().enumerate().take(self.constraints.len()) {
             let law = self.constraints.law(row);
             if law.is_spring() {
-                let approach = -(self.g.product(row, &motion.v) + rates[row].rate);
+                let approach = -(self.g.product(row, &motion.v) + rates.rate);
                 contacts.lambda[row] = law.force(contacts.gap[row], approach);
                 contacts.closed[row] = contacts.lambda[row] > T::zero();
             }
@@ -254,7 +256,9 @@ impl<T: Real> Start<'_, '_, T> {
             if is_balanced && is_searched {
                 return Ok(Balanced { is_moved, tolerance, forces });
             }
-            dofs.iter().for_each(|&dof| values[dof] += increment[dof]);
+            for &dof in &dofs {
+                values[dof] += increment[dof];
+            }
             (is_moved, is_searched) = (true, is_balanced);
             let rows = match unknown {
                 Unknown::Velocities { .. } => {

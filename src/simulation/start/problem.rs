@@ -167,12 +167,11 @@ impl<T: Real> StartProblem<T> {
         let Start { constraints, g, .. } = start;
         let rows = constraints.len();
         // y = (y without contact) + factor S λ.
-        let (factor, values, mut y) = match is_position {
-            true => (0.5 * lead * lead, &target.u, vec![T::zero(); rows]),
-            false => {
-                let rate = |row: usize| g.product(row, &target.v) + then[row].rate;
-                (lead, &target.v, (0..rows).map(rate).collect())
-            }
+        let (factor, values, mut y) = if is_position {
+            (0.5 * lead * lead, &target.u, vec![T::zero(); rows])
+        } else {
+            let rate = |row: usize| g.product(row, &target.v) + then[row].rate;
+            (lead, &target.v, (0..rows).map(rate).collect())
         };
         if is_position {
             let there = (target.t, [&target.u[..], &motion.v, &motion.a]);

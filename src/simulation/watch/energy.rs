@@ -73,7 +73,9 @@ impl<T: Real> Forces<T> {
 
     /// Sets the forces of contact to zero.
     fn clear(&mut self) {
-        [&mut self.contact, &mut self.friction, &mut self.damped].into_iter().for_each(|forces| forces.fill(T::zero()));
+        for forces in [&mut self.contact, &mut self.friction, &mut self.damped] {
+            forces.fill(T::zero());
+        }
         self.stored = T::zero();
     }
 
