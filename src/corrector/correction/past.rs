@@ -135,11 +135,11 @@ impl<T: Real> Correction<'_, T> {
         let jumps = problem.jump.iter().zip(&problem.left);
         for ((&row, &impulse), (&before, &after)) in problem.rows.iter().zip(&problem.increments).zip(jumps) {
             let gain = impulse * (T::of(0.5) * (before + after) + rebounds.past(row, 1, ago));
-            let own = if row < first { rates[row].rate } else { past_slips[row - first].rate };
+            let own = if g.is_tangential(row) { past_slips[row - first].rate } else { rates[row].rate };
             if previous.closed_at_start[contacts.tangents.owner(row)] {
                 **energy += gain - impulse * own;
             }
-            if row < first {
+            if !g.is_tangential(row) {
                 contacts.dissipated[row] -= gain;
             }
         }
@@ -173,7 +173,7 @@ impl<T: Real> Correction<'_, T> {
             _ => g.product(row, &motion.a) + past_slips[row - first].acceleration,
         };
         // A law that reads the gap at the start of a stage holds it at its current value.
-        let target = |row: usize| match field == 0 && row < first && constraints.0.law(row).reads_start() {
+        let target = |row: usize| match field == 0 && !g.is_tangential(row) && constraints.0.law(row).reads_start() {
             true => contacts.gap[row],
             false => rebounds.past(row, field, ago),
         };
@@ -190,7 +190,7 @@ impl<T: Real> Correction<'_, T> {
                 if !slides {
                     problem.add_block(&Block::new(row, 0, AdmissibleSet::Free));
                 }
-                let jump = if row < first { gap(row) } else { slip(row) } - target(row);
+                let jump = if g.is_tangential(row) { slip(row) } else { gap(row) } - target(row);
                 let values = [&motion.u, &motion.v, &motion.a][field];
                 problem.add_row(row, jump, rounding(g.magnitude(row, values) + jump.abs()), T::zero());
             }
