@@ -126,7 +126,7 @@ impl<T: Real> Correction<'_, T> {
 
     /// Books the energy that the projection of the velocities of past state k takes.
     fn book_past(&mut self, k: usize) -> Result<()> {
-        let Self { past, constraints, buffers, contacts, energy, before: previous, new, .. } = self;
+        let Self { past, constraints, buffers, contacts, energy, before: previous, new, g, .. } = self;
         let Buffers { problem, rebounds, readings: Readings { rates, past_slips, .. }, .. } = &mut **buffers;
         let motion = &past.states[k - 1];
         let ago = T::of(new.t - motion.t);
