@@ -14,15 +14,19 @@ use crate::dense::dot;
 use crate::error::{Error, Result};
 use crate::kernels::dense::{add_product, symmetric_eigen, transposed_product};
 use crate::memory;
-use crate::rounding::{MODE_RESIDUAL, ONLY_ROUNDING};
 use crate::sparse::scattered_signed;
 
-/// A vector that keeps less than this share of its length has lost more than a digit of its orthogonality, and is
-/// orthogonalized again.
-const KEPT: f64 = 0.1;
+/// A new part of a product below this share counts as zero.
+const NOTHING: f64 = 1e-14;
+
+/// A vector that keeps this share of its length has lost no orthogonality.
+const ENOUGH: f64 = 0.7;
+
+/// A vector that keeps less than this share is orthogonalized again.
+const SMALL: f64 = 0.1;
 
 /// Residual of a pair that counts as converged, over its eigenvalue of (K + σM)⁻¹ M.
-const CONVERGED: f64 = 0.1 * MODE_RESIDUAL;
+const CONVERGED: f64 = 1e-10;
 
 /// Converged eigenpairs without gaps, by ascending frequency.
 #[derive(Debug, Default)]
@@ -49,6 +53,9 @@ pub(super) struct Lanczos {
     columns: Vec<Vec<f64>>,
     /// Number of random vectors so far.
     drawn: usize,
+    /// Memory for vectors to be appended, and M times these.
+    vectors: Vec<f64>,
+    images: Vec<f64>,
     pub(super) block: usize,
     /// No vector orthogonal to the basis is left.
     pub(super) exhausted: bool,
@@ -67,6 +74,8 @@ impl Lanczos {
             done: 0,
             columns: Vec::new(),
             drawn: 0,
+            vectors: Vec::new(),
+            images: Vec::new(),
             block,
             exhausted: false,
         }
@@ -82,10 +91,11 @@ impl Lanczos {
         let n = self.n;
         let numbers: Vec<f64> = (0..n * self.block).map(|k| scattered_signed(self.drawn * n + k)).collect();
         self.drawn += self.block;
-        let mut vectors = pencil.mass.times(&numbers);
+        let mut vectors = vec![0.0; numbers.len()];
+        pencil.mass.times_into(&numbers, &mut vectors);
         pencil.solve(&mut vectors)?;
         let before = self.count;
-        self.append(pencil, &mut vectors)?;
+        self.append(pencil, &mut vectors, self.count)?;
         self.exhausted = self.count == before;
         Ok(())
     }
@@ -100,10 +110,14 @@ impl Lanczos {
             return Ok(());
         }
         let n = self.n;
-        let mut vectors = self.products[(ahead.start - self.kept) * n..(ahead.end - self.kept) * n].to_vec();
+        let mut vectors = std::mem::take(&mut self.vectors);
+        vectors.clear();
+        vectors.extend_from_slice(&self.products[(ahead.start - self.kept) * n..(ahead.end - self.kept) * n]);
         pencil.solve(&mut vectors)?;
-        let columns = self.append(pencil, &mut vectors)?;
+        // Up to rounding, these have components in the last vectors of the basis only.
+        let columns = self.append(pencil, &mut vectors, ahead.start.saturating_sub(2 * self.block))?;
         self.columns.extend(columns);
+        self.vectors = vectors;
         self.done = ahead.end;
         let kept = self.done.saturating_sub(2 * self.block).max(self.kept);
         self.products.drain(..(kept - self.kept) * n);
@@ -112,78 +126,162 @@ impl Lanczos {
     }
 
     /// Removes the components of vectors in the basis, returns their coefficients, and appends the normalized
-    /// remainders that do not vanish.
-    fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64]) -> Result<Vec<Vec<f64>>> {
-        let (n, first) = (self.n, self.count);
+    /// remainders. The largest components are in the basis from `recent` on.
+    fn append(&mut self, pencil: &mut Pencil, vectors: &mut [f64], recent: usize) -> Result<Vec<Vec<f64>>> {
+        let n = self.n;
         let width = vectors.len() / n;
-        let mut products = pencil.mass.times(vectors);
-        let before = norms(n, vectors, &products);
-        let (mut columns, mut last) = (vec![vec![0.0; first]; width], before.clone());
+        let mut products = std::mem::take(&mut self.images);
+        products.clear();
+        memory::grow(&mut products, n, width, "Lanczos vectors")?;
+        pencil.mass.times_into(vectors, &mut products);
+        let before: Vec<f64> = norms(n, vectors, &products);
+        let mut columns = vec![vec![0.0; self.count]; width];
+        self.clear_recent(pencil, recent, [vectors, &mut products], &mut columns);
         // Once is enough if little is removed, otherwise twice (Kahan; Giraud, Langou, Rozložník, van den Eshof
         // 2005).
+        let mut lengths = norms(n, vectors, &products);
         for _ in 0..3 {
             remove(n, &self.locked, &products, vectors);
             let coefficients = remove(n, &self.basis, &products, vectors);
-            for (column, added) in columns.iter_mut().zip(coefficients.chunks(first.max(1))) {
-                column.iter_mut().zip(added).for_each(|(c, x)| *c += x);
-            }
-            products = pencil.mass.times(vectors);
-            let lengths = norms(n, vectors, &products);
-            let kept = |k: usize| lengths[k] >= KEPT * last[k] || lengths[k] <= ONLY_ROUNDING * before[k];
-            let are_kept = (0..width).all(kept);
-            last = lengths;
-            if are_kept {
+            add(&mut columns, 0, &coefficients);
+            pencil.mass.times_into(vectors, &mut products);
+            let last = std::mem::replace(&mut lengths, norms(n, vectors, &products));
+            let kept = |k: usize| lengths[k] >= ENOUGH * last[k] || lengths[k] <= NOTHING * before[k];
+            if (0..width).all(kept) {
                 break;
             }
         }
-        let each = vectors.chunks_exact_mut(n).zip(products.chunks_exact_mut(n)).zip(&mut columns).zip(&before);
-        for (((vector, product), column), &before) in each {
-            self.append_one(pencil, first, [vector, product], before, column)?;
+        if !self.append_together([vectors, &products], [&before, &lengths], &mut columns)? {
+            self.append_singly(pencil, [vectors, &mut products], [&before, &lengths], &mut columns)?;
         }
+        self.images = products;
         Ok(columns)
     }
 
-    /// Appends the normalized remainder of a vector without components in the basis before `first`, unless it
-    /// vanishes compared with its length `before`; adds its coefficients to a column.
-    fn append_one(
-        &mut self,
+    /// Removes components in the basis from `recent` on, and updates the products with M.
+    fn clear_recent(
+        &self,
         pencil: &mut Pencil,
-        first: usize,
-        [vector, product]: [&mut [f64]; 2],
-        before: f64,
-        column: &mut Vec<f64>,
-    ) -> Result<()> {
+        recent: usize,
+        [vectors, products]: [&mut [f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) {
         let n = self.n;
-        column.resize(self.count, 0.0);
-        let mut norm = norms(n, vector, product)[0];
-        for pass in 0..4 {
-            // A small remainder is no longer orthogonal to the earlier vectors.
-            let from = if pass == 0 { first } else { 0 };
-            let coefficients = remove(n, &self.basis[from * n..], product, vector);
-            column[from..].iter_mut().zip(&coefficients).for_each(|(c, x)| *c += x);
-            if pass > 0 {
-                remove(n, &self.locked, product, vector);
-                product.copy_from_slice(&pencil.mass.times(vector));
-            } else if !coefficients.is_empty() {
-                add_product(-1.0, n, &self.products[(first - self.kept) * n..], &coefficients, product);
+        let recent = recent.max(self.kept);
+        if recent == self.count {
+            return;
+        }
+        let before = norms(n, vectors, products);
+        let coefficients = remove(n, &self.basis[recent * n..], products, vectors);
+        add_product(-1.0, n, &self.products[(recent - self.kept) * n..], &coefficients, products);
+        add(columns, recent, &coefficients);
+        // If much was removed, the updated products have lost accuracy and are computed again.
+        let after = norms(n, vectors, products);
+        if after.iter().zip(&before).any(|(after, before)| *after < SMALL * before) {
+            pencil.mass.times_into(vectors, products);
+        }
+    }
+
+    /// Orthonormalizes vectors that are orthogonal to the basis by the Cholesky factor of their products, and appends
+    /// them; does nothing unless all are well separated. `before` and `lengths` are their lengths before and after
+    /// they were made orthogonal to the basis.
+    fn append_together(
+        &mut self,
+        [vectors, products]: [&[f64]; 2],
+        [before, lengths]: [&[f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) -> Result<bool> {
+        let (n, width) = (self.n, columns.len());
+        let mut gram = vec![0.0; width * width];
+        transposed_product(n, vectors, products, &mut gram);
+        // U with UᵀU = VᵀMV, column by column, and U⁻¹.
+        let (mut upper, mut inverse) = (vec![0.0; width * width], vec![0.0; width * width]);
+        for k in 0..width {
+            for j in 0..k {
+                let known = dot(&upper[j * width..j * width + j], &upper[k * width..k * width + j]);
+                upper[k * width + j] = (gram[k * width + j] - known) / upper[j * width + j];
             }
-            let last = std::mem::replace(&mut norm, norms(n, vector, product)[0]);
-            if !norm.is_finite() {
-                return Err(Error::ModeResidual { mode: self.count, residual: norm, tolerance: ONLY_ROUNDING });
+            let column = &upper[k * width..k * width + k];
+            let pivot = (gram[k * width + k] - dot(column, column)).max(0.0).sqrt();
+            let apart = pivot >= SMALL * lengths[k] && lengths[k] >= SMALL * before[k] && pivot.is_normal();
+            if !apart {
+                return Ok(false);
             }
-            if norm <= ONLY_ROUNDING * before {
-                return Ok(());
-            }
-            if norm >= KEPT * last {
-                break;
+            upper[k * width + k] = pivot;
+            inverse[k * width + k] = 1.0 / pivot;
+            for j in (0..k).rev() {
+                let known: f64 = (j + 1..=k).map(|i| upper[i * width + j] * inverse[k * width + i]).sum();
+                inverse[k * width + j] = -known / upper[j * width + j];
             }
         }
-        vector.iter_mut().chain(product.iter_mut()).for_each(|x| *x /= norm);
-        memory::grow(&mut self.basis, n, self.count + 1, "Lanczos vectors")?;
-        self.basis[self.count * n..].copy_from_slice(vector);
-        self.products.extend_from_slice(product);
-        column.push(norm);
-        self.count += 1;
+        for (k, column) in columns.iter_mut().enumerate() {
+            column.extend(&upper[k * width..=k * width + k]);
+        }
+        memory::grow(&mut self.basis, n, self.count + width, "Lanczos vectors")?;
+        add_product(1.0, n, vectors, &inverse, &mut self.basis[self.count * n..]);
+        memory::grow(&mut self.products, n, self.count - self.kept + width, "Lanczos vectors")?;
+        add_product(1.0, n, products, &inverse, &mut self.products[(self.count - self.kept) * n..]);
+        self.count += width;
+        Ok(true)
+    }
+
+    /// Orthonormalizes vectors that are orthogonal to the basis one by one, and appends those that do not vanish;
+    /// `before` and `lengths` as above.
+    fn append_singly(
+        &mut self,
+        pencil: &mut Pencil,
+        [vectors, products]: [&mut [f64]; 2],
+        [before, lengths]: [&[f64]; 2],
+        columns: &mut [Vec<f64>],
+    ) -> Result<()> {
+        let (n, first) = (self.n, self.count);
+        for (k, column) in columns.iter_mut().enumerate() {
+            let vector = &mut vectors[k * n..(k + 1) * n];
+            let product = &mut products[k * n..(k + 1) * n];
+            column.resize(self.count, 0.0);
+            for _ in 0..2 {
+                let coefficients = remove(n, &self.basis[first * n..], product, vector);
+                if !coefficients.is_empty() {
+                    add_product(-1.0, n, &self.products[(first - self.kept) * n..], &coefficients, product);
+                }
+                column[first..].iter_mut().zip(&coefficients).for_each(|(c, x)| *c += x);
+            }
+            let mut norm = norms(n, vector, product)[0];
+            if !norm.is_finite() {
+                return Err(Error::ModeResidual { mode: self.count, residual: norm, tolerance: NOTHING });
+            }
+            let small = norm < SMALL * lengths[k];
+            if small {
+                pencil.mass.times_into(vector, product);
+                norm = norms(n, vector, product)[0];
+            }
+            if norm <= NOTHING * before[k] {
+                continue;
+            }
+            for x in vector.iter_mut().chain(product.iter_mut()) {
+                *x /= norm;
+            }
+            // A small remainder is orthogonal only to the rounding of the original length: repeat at its own length.
+            if small {
+                for _ in 0..2 {
+                    remove(n, &self.locked, product, vector);
+                    remove(n, &self.basis, product, vector);
+                    pencil.mass.times_into(vector, product);
+                }
+                let length = norms(n, vector, product)[0];
+                if length <= SMALL {
+                    continue;
+                }
+                for x in vector.iter_mut().chain(product.iter_mut()) {
+                    *x /= length;
+                }
+            }
+            memory::grow(&mut self.basis, n, self.count + 1, "Lanczos vectors")?;
+            self.basis[self.count * n..].copy_from_slice(vector);
+            self.products.extend_from_slice(product);
+            column.push(norm);
+            self.count += 1;
+        }
         Ok(())
     }
 
@@ -243,6 +341,14 @@ pub(super) fn remove(n: usize, basis: &[f64], products: &[f64], vectors: &mut [f
         add_product(-1.0, n, basis, &coefficients, vectors);
     }
     coefficients
+}
+
+/// Adds the coefficients of vectors in a basis to their columns, starting at row `first`.
+fn add(columns: &mut [Vec<f64>], first: usize, coefficients: &[f64]) {
+    let height = coefficients.len() / columns.len();
+    for (column, added) in columns.iter_mut().zip(coefficients.chunks(height.max(1))) {
+        column[first..].iter_mut().zip(added).for_each(|(c, x)| *c += x);
+    }
 }
 
 /// Lengths in the inner product of M.

@@ -51,11 +51,17 @@ impl Operator {
 
     /// The products with vectors, column by column.
     pub(super) fn times(&mut self, x: &[f64]) -> Vec<f64> {
-        let (n, mut out) = (self.matrix.ncols(), vec![0.0; x.len()]);
+        let mut out = vec![0.0; x.len()];
+        self.times_into(x, &mut out);
+        out
+    }
+
+    /// Writes the products with vectors, column by column.
+    pub(super) fn times_into(&mut self, x: &[f64], out: &mut [f64]) {
+        let n = self.matrix.ncols();
         for (x, out) in x.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
             self.product.write(1.0, self.matrix.as_ref(), x, out);
         }
-        out
     }
 }
 
