@@ -290,7 +290,7 @@ fn history_of_another_run_is_refused() {
     let resume = |(state, history)| builder().resume(state, history).build();
     refused!(resume(donor(3, 0.01, false)), Error::Dimension { .. }, "history");
     refused!(resume(donor(2, 0.02, false)), Error::Parameter { .. }, "step size");
-    refused!(resume(donor(2, 0.01, true)), Error::Dimension { .. }, "history");
+    refused!(resume(donor(2, 0.01, true)), Error::Incompatible { .. }, "Newmark", "composite");
     let same_size = Simulation::builder(system(), contact_dynamics::Bdf2, 0.01).build().unwrap();
     let other = (same_size.state().clone(), same_size.history().clone());
     refused!(resume(other), Error::Incompatible { .. }, "BDF2", "composite");

@@ -198,7 +198,7 @@ fn rows_and_tableaux_are_asked_for_what_they_do_not_have() {
 
 #[test]
 fn round_obstacles_of_any_size() {
-    for e in [-300, -160, -30, 0, 30, 160, 300] {
+    for e in [-150, -30, 0, 30, 150] {
         let unit = 2.0 * 10_f64.powi(e);
         for (side, sign) in [(Side::Outside, 1.0), (Side::Inside, -1.0)] {
             let ball = Sphere::new([0.0; 3], unit, side).unwrap();

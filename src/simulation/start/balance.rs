@@ -212,7 +212,7 @@ impl<T: Real> Start<'_, '_, T> {
         let interface = self.constraints.interface().to_vec();
         let mut increment = vec![T::zero(); given.len()];
         let mut on_interface = vec![T::zero(); interface.len()];
-        let (mut largest, mut is_moved, mut is_searched, mut worst) = (T::zero(), false, true, dofs[0]);
+        let (mut before, mut is_moved, mut is_searched, mut worst) = (T::infinity(), false, true, dofs[0]);
         for _ in 0..ITERATIONS {
             let Self { system, g, .. } = &mut *self;
             system.force(t, &motion.u, &motion.v, &mut increment)?;
@@ -245,13 +245,13 @@ impl<T: Real> Start<'_, '_, T> {
                 let (dof, value) = (worst, size.value());
                 return Err(Error::StepNotFinite { t, h, what: "the motion in static balance", dof, value });
             }
-            largest = largest.max(size);
             let values = unknown.of(motion);
             let scale = T::largest(values).max(T::largest(given));
-            // Increments of Newton's method fall quadratically: the next one would be rounding. Gaps are met within
-            // their own rounding, which may exceed the rounding of displacements: they are computed from coordinates.
+            // The next increment, if it falls by the same factor, would be rounding. Gaps are met within their own
+            // rounding, which may exceed the rounding of displacements: they are computed from coordinates.
             let bound = rounding(scale) + noise;
-            let is_balanced = size <= bound || size / largest * size <= bound;
+            let is_balanced = size <= bound || size / before * size <= bound;
+            before = size;
             let tolerance = noise + self.g.largest_row() * (size + rounding(scale));
             if is_balanced && is_searched {
                 return Ok(Balanced { is_moved, tolerance, forces });

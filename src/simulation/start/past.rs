@@ -46,19 +46,20 @@ impl<T: Real> Start<'_, '_, T> {
     fn is_free_flight(&mut self, motion: &Motion<T>, past: &[Motion<T>]) -> Result<bool> {
         let rounding = rounding(T::one()).value();
         let speed = self.largest(&motion.v)?;
-        let mut accelerations = Some(motion.a.clone());
+        let (mut at, mut accelerations) = (motion, Some(motion.a.clone()));
         let mut past = past.iter();
         while let Some(a) = accelerations {
             let change = self.h * self.largest(&a)?;
             // The rounding of forces that cancel matters only where there are such forces.
             if change > rounding * speed {
-                let sensitivity = self.sensitivity(motion)?;
+                let sensitivity = self.sensitivity(at)?;
                 if !sensitivity.is_some_and(|most| change <= rounding * (speed + self.h * most)) {
                     return Ok(false);
                 }
             }
             let Some(motion) = past.next() else { return Ok(true) };
-            accelerations = self.smooth_acceleration(motion.t, &motion.u, &motion.v)?;
+            at = motion;
+            accelerations = self.smooth_acceleration(at.t, &at.u, &at.v)?;
         }
         Ok(false)
     }
