@@ -101,8 +101,8 @@ impl Surface {
             }
         }
         sides.sort_unstable();
-        // By facet, the number of neighbors with the opposite orientation.
-        let mut opposite = vec![0; self.facets.len()];
+        // By facet, the number of neighbors with the opposite orientation, and of those minus the others.
+        let (mut opposite, mut excess) = (vec![0; self.facets.len()], vec![0; self.facets.len()]);
         for group in sides.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             match *group {
                 [] | [_] => {}
@@ -111,6 +111,7 @@ impl Surface {
                         self.neighbors[facet][side] = Some(neighbor);
                         self.rims[facet].sides[side] = false;
                         opposite[facet] += usize::from(one == other);
+                        excess[facet] += if one == other { 1 } else { -1 };
                     }
                 }
                 [_, _, (_, _, facet, ..), ..] => {
@@ -119,13 +120,13 @@ impl Surface {
                 }
             }
         }
-        match (0..opposite.len()).rev().max_by_key(|&facet| opposite[facet]) {
-            Some(facet) if opposite[facet] > 0 => {
+        match (0..opposite.len()).rev().filter(|&facet| opposite[facet] > 0).max_by_key(|&facet| excess[facet]) {
+            Some(facet) => {
                 let reason =
                     "its normal and those of its neighbors point to different sides; turn it, or the neighbors";
                 Err(Error::InvertedFacet { facet, nodes: self.facets[facet].nodes().to_vec(), reason })
             }
-            _ => Ok(()),
+            None => Ok(()),
         }
     }
 
