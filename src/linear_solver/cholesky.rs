@@ -512,7 +512,8 @@ impl<T: Real> Condensation<T> for Factor<T> {
     fn solve(&mut self, forces: &mut [T]) -> Result<()> {
         let (first, height) = (self.trailing().start, self.interface.len());
         for columns in forces.chunks_mut((height * WIDEST).max(1)) {
-            if columns.len() > height && self.solve_together(first, columns)? {
+            // One column too: a response must not depend on the others that are solved for with it.
+            if self.solve_together(first, columns)? {
                 continue;
             }
             for column in columns.chunks_exact_mut(height) {
