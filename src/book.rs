@@ -16,7 +16,11 @@ pages! {
     Start = "docs/start.md";
     Choosing = "docs/choosing.md";
     #[cfg(feature = "mesh-contact")]
-    Contact = "docs/contact.md";
+    ContactObstacles = "docs/contact/obstacles.md";
+    #[cfg(feature = "mesh-contact")]
+    ContactMeshes = "docs/contact/meshes.md";
+    #[cfg(feature = "mesh-contact")]
+    ContactTies = "docs/contact/ties.md";
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";
     Performance = "docs/performance.md";

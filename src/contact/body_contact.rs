@@ -31,8 +31,8 @@ use crate::real::Real;
 ///
 /// - With a compliant law the springs of faces, corners and edges act side by side: contact is stiffer at edges.
 /// - As with [`Mortar`], nodes within faces are kept out only in the mean over their facets: they penetrate by a
-///   tenth of an element in blocks that fall on edges (`docs/contact.md` has a table). A surface against itself has
-///   no weighted gaps; its pressures come from nodes on facets.
+///   tenth of an element in blocks that fall on edges (`docs/measured/contact.md` has a table). A surface against
+///   itself has no weighted gaps; its pressures come from nodes on facets.
 ///
 /// ```
 /// use contact_dynamics::contact::BodyContact;

@@ -302,7 +302,7 @@ pub enum Rates {
     /// The caller finds them by central differences of the gaps in time around (t, u): ∂g/∂t of g(t ± δ, u), and
     /// Ġ v + ∂ġ/∂t of g(t ± δ, u ± δ v), to which the constraint [follows](ContactConstraint::follow). δ is at most
     /// 1/16 of the time that the search looks ahead (1/4 in single precision), also at a start, and gaps within t ± δ
-    /// enter. The errors are fourth and higher derivatives of the gap in that time (`docs/contact.md`).
+    /// enter. The errors are fourth and higher derivatives of the gap in that time (`docs/contact/obstacles.md`).
     Differences,
 }
 

@@ -93,7 +93,7 @@ pub enum ContactLaw {
     ///
     /// * From the second step on the rate of a pressed contact is zero: it persists. With the midpoint rule,
     ///   [`Gssss::new(1, 1, 1)`](crate::Gssss), and a fine mesh the force is smooth without a corrector (figures in
-    ///   `docs/contact.md`). Linear momentum is conserved.
+    ///   `docs/contact/laws.md`). Linear momentum is conserved.
     /// * Known failures: the force of the first step is that of `Rigid`, and on a coarse mesh contact may open after
     ///   it. The second step leaves a gap that stays while contact lasts. Where the change of u is the mean of v, it
     ///   is up to half a step's approach (so a run may start with penetration). Accelerations can alternate: with the

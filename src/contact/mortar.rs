@@ -63,8 +63,8 @@ const BEYOND: f64 = 0.25;
 ///
 /// Pressure on flat surfaces is exact with either choice, for any meshes. Where a small surface slides over a large
 /// one the small one should be the slave, even if its facets are larger: the contact moves with its nodes, and forces
-/// vary less (`docs/contact.md`, ironing). The cost of a search is the intersection of all pairs of facets near each
-/// other.
+/// vary less (`docs/measured/contact.md`, ironing). The cost of a search is the intersection of all pairs of facets
+/// near each other.
 ///
 /// # Linearization
 ///
@@ -89,7 +89,7 @@ const BEYOND: f64 = 0.25;
 ///   ([`Contact::recovery`](super::Contact::recovery)).
 /// - If two layers of a master lie behind each other within the reach, the slave is in contact with both.
 /// - On facets of second order that are curved, or whose nodes are not in the middle, the pressure of the patch test
-///   is not exact to rounding (`docs/contact.md`), because areas are taken from the linear parts.
+///   is not exact to rounding (`docs/measured/contact.md`), because areas are taken from the linear parts.
 /// - Gaps are measured along the normals of facets; for facets of second order along the normals of their parts.
 ///
 /// # Identity

@@ -39,7 +39,7 @@ fn check(scenes: impl Iterator<Item = (Meeting, u64)>, wrong: impl Fn(Meeting, u
 #[test]
 fn nothing_is_found() {
     check(scenes(1..3), |meeting, _, figures| {
-        // (What edges and corners do that pass each other unseen is in the table of docs/contact.md.)
+        // (What edges and corners do that pass each other unseen is in the table of docs/measured/contact.md.)
         let gain = growth(figures).filter(|_| !meeting.misses_edges());
         figures.findings.first().cloned().or(gain)
     });

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 ///
 /// the quadratic stress criterion that is usual for cohesive interfaces (Camanho and Dávila, NASA/TM-2002-211737, eq.
 /// 8). Compression does not break it. A bond breaks as a whole and at once: it stores no energy, and a broken bond
-/// opens without energy (`docs/contact.md`, bonds).
+/// opens without energy (`docs/contact/ties.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BondStrength {
