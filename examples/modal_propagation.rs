@@ -1,7 +1,7 @@
 //! Reduced bars in steps that are exact between contacts, beside a scheme: the error of the contact force, and energy.
 //!
 //! `cargo run --release --example modal_propagation -- --output target/modal_propagation` prints the tables of
-//! `docs/reduction.md`; with `--quick` phases and modes are fewer.
+//! `docs/measured/reduction.md`; with `--quick` phases and modes are fewer.
 
 use contact_dynamics::reduction::Boundary;
 use contact_dynamics::{Bathe, TimeIntegrator};

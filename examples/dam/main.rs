@@ -2,8 +2,8 @@
 //! bodies on two threads, body by body with a frame between them, and with reduced blocks.
 //!
 //! `cargo run --release --features rayon --example dam -- --output target/dam` prints the tables of
-//! `docs/scenes/dam.md` and writes them and the record of the earthquake; with `--quick` the mesh is coarse and the run
-//! short. Without the feature everything takes one thread.
+//! `docs/scenes/dam.md` and `docs/measured/dam.md` and writes them and the record of the earthquake; with `--quick` the
+//! mesh is coarse and the run short. Without the feature everything takes one thread.
 //!
 //! `valley.rs` has the blocks, their joints and loads, `record.rs` what is written down of a run, `whole.rs` the runs
 //! of one system, `split.rs` the loop body by body, `threads.rs` the threads.

@@ -1,7 +1,7 @@
 //! Pounding: two frames of different periods, a gap, one earthquake, and nine ways to let them collide.
 //!
-//! `cargo run --release --example pounding` prints the tables of `docs/scenes/pounding.md` and writes them and a figure
-//! (`pounding.svg`); with `--quick` the ground shakes for four seconds, and references are coarse.
+//! `cargo run --release --example pounding` prints the tables of `docs/measured/pounding.md` and writes them and a
+//! figure (`pounding.svg`); with `--quick` the ground shakes for four seconds, and references are coarse.
 //!
 //! `models.rs` has what is compared; `tables.rs` the figures of all models at their references, their errors by the
 //! step, what the stiffness of a contact does, and the restitution of damped laws; `decks.rs` two bridge decks (`deck_models.rs`);

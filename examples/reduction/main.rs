@@ -1,7 +1,7 @@
 //! Bodies reduced to a few modes and their contact dofs: how right the contact force is, and what it costs.
 //!
-//! `cargo run --release --example reduction -- --output target/reduction` prints the tables of `docs/reduction.md` and
-//! writes them and a figure; with `--quick` steps, phases and bodies are fewer.
+//! `cargo run --release --example reduction -- --output target/reduction` prints the tables of
+//! `docs/measured/reduction.md` and writes them and a figure; with `--quick` steps, phases and bodies are fewer.
 //!
 //! `bars.rs` has bars against a wall and each other, `fronts.rs` the taper in closed form, `blocks.rs` blocks in the
 //! plane and in space, `equal_time.rs` these over the time of a run, `ball.rs` Hertz' impact, `pair.rs` two blocks,

@@ -1,7 +1,7 @@
 //! A drill string in a curved well, pulled out and run in: hundreds of contacts with friction along a rod.
 //!
-//! `cargo run --release --example rod_in_well` prints the tables of `docs/scenes/rod_in_well.md` and writes them and a
-//! figure (`rod_in_well.svg`); with `--quick` elements are few and runs are short.
+//! `cargo run --release --example rod_in_well` prints the tables of `docs/measured/rod_in_well.md` and writes them
+//! and a figure (`rod_in_well.svg`); with `--quick` elements are few and runs are short.
 //!
 //! `drag.rs` compares the hook load with the soft string; `wave.rs` has the front of a wave that friction stops;
 //! `cost.rs` the time of a step beside a bare solve; `figure.rs` the figure.
