@@ -1,8 +1,8 @@
 //! Large motion: the stiff elastic pendulum, bodies that tumble onto a floor, and long runs; what each scheme conserves
 //! and how many iterations it takes.
 //!
-//! `cargo run --release --example large_motion` prints the tables of `docs/large_motion.md` and writes them; with
-//! `--quick` the flights and the long runs are shorter.
+//! `cargo run --release --example large_motion` prints the tables of `docs/measured/large_motion.md` and writes them;
+//! with `--quick` the flights and the long runs are shorter.
 
 use contact_dynamics::{
     Bathe, Bdf2, Composite, EnergyMomentum, GeneralizedAlpha, Houbolt, Newmark, Park, Result, TimeIntegrator,
