@@ -9,7 +9,7 @@ use crate::real::Real;
 use crate::rounding::rounding;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), started from sweeps
-/// over the blocks. On redundant rows it may not end; the problem is then solved by proximal steps, each with a
+/// over the blocks, and started again from more sweeps if it does not end. On redundant rows neither may end; the problem is then solved by proximal steps, each with a
 /// positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
@@ -28,12 +28,13 @@ pub(super) struct ConeNewton<T> {
     offset: Vec<T>,
 }
 
-/// Sweeps before Newton's method, at least, and in a proximal step whose Newton iterations do not end.
+/// Sweeps before the first attempt of Newton's method, at least, and before later ones.
 const FIRST_SWEEPS: usize = 3;
 const MORE_SWEEPS: usize = 50;
 
-/// Newton iterations.
+/// Newton iterations of an attempt, and the number of attempts, each from more sweeps.
 const ITERATIONS: usize = 20;
+const ROUNDS: usize = 4;
 
 /// Proximal steps: the initial share of the diagonal added to W, and its shrink factor. Nearly redundant rows are
 /// resolved only with a share below their difference relative to the diagonal.
@@ -68,12 +69,16 @@ impl<T: Real> ConeNewton<T> {
         let mut spent = 0;
         // A sweep costs about 3/n of a Newton iteration: first up to half an iteration's worth of sweeps, as long as
         // they converge.
-        let sweeps = FIRST_SWEEPS.max(size / 6);
-        let schedule = Schedule { omega: T::one(), sweeps, impatient: true };
-        if self.sweeps.solve(acceptance, symmetry, schedule, &mut spent, multipliers)
-            || self.newton(acceptance, &mut spent, multipliers)
-            || self.proximal(acceptance, symmetry, &mut spent, multipliers)
-        {
+        for round in 0..ROUNDS {
+            let sweeps = if round == 0 { FIRST_SWEEPS.max(size / 6) } else { MORE_SWEEPS };
+            let schedule = Schedule { omega: T::one(), sweeps, impatient: true };
+            if self.sweeps.solve(acceptance, symmetry, schedule, &mut spent, multipliers)
+                || self.newton(acceptance, &mut spent, multipliers)
+            {
+                return Ok(spent);
+            }
+        }
+        if self.proximal(acceptance, symmetry, &mut spent, multipliers) {
             return Ok(spent);
         }
         Err(acceptance.failure(spent, multipliers))
