@@ -26,7 +26,7 @@ pub(super) fn factor<T: Real>(
     fixed: &[usize],
 ) -> Result<Box<dyn Factorization<T>>> {
     let reduced = sparse::Combination::new(mass.ncols(), fixed, &[mass.symbolic()])?;
-    let mut values = vec![T::zero(); reduced.len()];
+    let mut values = memory::zeros(reduced.len(), 1, "the values of the mass matrix")?;
     reduced.fill(&[(T::one(), mass.val())], None, &mut values);
     let mut factor = solver.analyze(reduced.pattern(), &[])?;
     factor.factorize(reduced.view(&values)).map_err(|error| match error {
@@ -119,7 +119,7 @@ impl<T: Real> ConsistentInverse<T> {
         if !is_chain && T::scale_blocks(1, (&pointers, &columns), &mut values, &mut scaling).is_ok() {
             let method = Method::Iteration(Scaled { pointers, columns, values, scaling, vectors: Vec::new() });
             let mut solver = Solver { weights, method, response: vec![T::zero(); places] };
-            if solver.is_definite() {
+            if solver.is_definite()? {
                 return Ok(Self { fixed, layers, force: vec![T::zero(); places], solver });
             }
         }
@@ -242,12 +242,12 @@ impl<T: Real> Solver<T> {
     /// no negative curvature is found, the part of the right-hand side along a direction of negative curvature grows
     /// from one residual to the next (the residual polynomial is 1 at zero and has positive roots), and along one of
     /// zero curvature it stays.
-    fn is_definite(&mut self) -> bool {
-        let Self { weights, method: Method::Iteration(scaled), .. } = self else { return false };
+    fn is_definite(&mut self) -> Result<bool> {
+        let Self { weights, method: Method::Iteration(scaled), .. } = self else { return Ok(false) };
         let scattered = || weights.iter().enumerate().map(|(k, &m)| (k, T::of(sparse::scattered_signed(k)) * m));
         let tolerance = half_digits::<T>().value();
-        let outcomes = scaled.iterate(weights.len(), TRIAL, tolerance, |lane| (lane == 0).then(scattered));
-        matches!(outcomes, Ok([Outcome::Converged { .. }, ..]))
+        let outcomes = scaled.iterate(weights.len(), TRIAL, tolerance, |lane| (lane == 0).then(scattered))?;
+        Ok(matches!(outcomes, [Outcome::Converged { .. }, ..]))
     }
 
     /// As [`ConsistentInverse::respond`], with forces by places; the last response stays in `response`.
