@@ -174,7 +174,9 @@ impl<T: Real> JumpProblem<T> {
             values.clear();
             values.resize(self.rows.len(), T::zero());
         }
-        if self.blocks.iter().all(Block::is_equation) {
+        // Contacts that stick and slide in turn would leave no factor of S to keep.
+        let has_friction = self.rows.iter().any(|&row| g.is_tangential(row));
+        if !has_friction && self.blocks.iter().all(Block::is_equation) {
             return self.solve_equations(g, projection, |row| no_response(t, id(row)));
         }
         projection.sort(g, &self.rows);
