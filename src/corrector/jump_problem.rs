@@ -8,7 +8,7 @@ use crate::contact_solver::{
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::{half_digits, rounding};
+use crate::rounding::{half_digits, rounding, share_of_rounding};
 
 /// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
 pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
@@ -72,6 +72,15 @@ pub(crate) struct JumpProblem<T> {
     /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
     directions: Vec<(usize, [T; 2])>,
     group: Group<T>,
+}
+
+/// How the friction of sliding contacts enters a problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Friction {
+    /// Proportional to the unknown normal multiplier.
+    Follows,
+    /// Fixed at its value in the totals; also used if nothing slides.
+    Lags,
 }
 
 /// Rows that S couples, as a problem for a contact solver.
@@ -230,10 +239,15 @@ impl<T: Real> JumpProblem<T> {
         presses: T,
     ) -> Solved<T> {
         loop {
-            let slides = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
-            group.pose(self, positions);
-            if let Err(failure) = group.solve(solver, !slides) {
-                return Err(group.jammed(self, positions).unwrap_or(failure));
+            let follows = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
+            let friction = if follows { Friction::Follows } else { Friction::Lags };
+            group.pose(self, positions, friction);
+            if let Err(failure) = group.solve(solver, friction) {
+                return match group.jammed(self, positions) {
+                    Some(jammed) => Err(jammed),
+                    None if follows => self.solve_lagging(positions, group, solver, presses).map_err(|_| failure),
+                    None => Err(failure),
+                };
             }
             let mut again = false;
             for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
@@ -273,6 +287,74 @@ impl<T: Real> JumpProblem<T> {
                 }
             }
         }
+    }
+
+    /// Solves by iteration with lagged friction if the equations with following friction have no solution because a
+    /// sliding contact would pull. Each iteration fixes the friction of sliding contacts and solves for the others.
+    fn solve_lagging(
+        &mut self,
+        positions: &[usize],
+        group: &mut Group<T>,
+        solver: &mut dyn ContactSolver<T>,
+        presses: T,
+    ) -> Solved<T> {
+        /// Largest number of iterations, each relaxed by one half. The error after the last one is accepted: the
+        /// reported friction is in its cone, and the remaining jump is a jump of accelerations.
+        const PASSES: usize = 60;
+        /// Growth of the change per iteration that counts as divergence. It may occur with nearly equal rows, of
+        /// which one pulls while the other presses. Sliding contacts then get no friction.
+        const DIVERGES: f64 = 1e2;
+        let half = T::of(0.5);
+        for &position in positions {
+            self.totals[position] = T::zero();
+        }
+        let (mut least, mut diverges) = (T::infinity(), false);
+        for _ in 0..PASSES {
+            group.pose(self, positions, Friction::Lags);
+            group.solve(solver, Friction::Lags)?;
+            let (mut change, mut largest) = (T::zero(), T::zero());
+            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
+                let position = positions[at];
+                let block = &self.blocks[self.owners[position]];
+                self.totals[position] = multiplier;
+                for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
+                    let pressing = presses * (presses * multiplier).max(T::zero());
+                    let friction = &mut self.totals[position + 1 + k];
+                    let moved = half * (along * pressing - *friction);
+                    *friction += moved;
+                    (change, largest) = (change.max(moved.abs()), largest.max(friction.abs()));
+                }
+            }
+            if change <= share_of_rounding::<T>() * largest {
+                break;
+            }
+            least = least.min(change);
+            diverges = change > T::of(DIVERGES) * least || !change.is_finite();
+            if diverges {
+                break;
+            }
+        }
+        if diverges {
+            for &position in positions {
+                self.totals[position] = T::zero();
+            }
+            group.pose(self, positions, Friction::Lags);
+            group.solve(solver, Friction::Lags)?;
+            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
+                self.totals[positions[at]] = multiplier;
+            }
+            self.measure(positions, group);
+            return Ok(());
+        }
+        for &at in &group.unknowns {
+            let (position, block) = (positions[at], &self.blocks[self.owners[positions[at]]]);
+            let pressing = presses * (presses * self.totals[position]).max(T::zero());
+            for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
+                self.totals[position + 1 + k] = along * pressing;
+            }
+        }
+        self.measure(positions, group);
+        Ok(())
     }
 
     /// Computes the remaining jumps of a group.
@@ -315,7 +397,7 @@ impl<T: Real> Group<T> {
 
     /// Sets up the problem of the rows at these positions, with S given: one unknown per row, but a single unknown
     /// per sliding contact, whose friction is proportional to the normal multiplier.
-    fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize]) {
+    fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize], friction: Friction) {
         let size = positions.len();
         let Self { s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
         let block = |at: usize| &all.blocks[all.owners[positions[at]]];
@@ -349,15 +431,17 @@ impl<T: Real> Group<T> {
             }
             let (mut contained, mut terms) = (T::zero(), T::zero());
             for (j, &position) in positions.iter().enumerate() {
-                contained += entry(j) * all.base[position];
-                terms += (entry(j) * all.base[position]).abs();
+                let lags = friction == Friction::Lags && block(j).direction.is_some() && block(j).place < position;
+                let base = all.base[position] - if lags { all.totals[position] } else { T::zero() };
+                contained += entry(j) * base;
+                terms += (entry(j) * base).abs();
             }
             offset.push(all.jump[positions[i]] - contained);
             tolerance.push(all.tolerance[positions[i]] + rounding(terms));
             for &j in unknowns.iter() {
                 let Block { tangents, direction, compliance, place, .. } = *block(j);
                 let mut sum = if known(j).is_some() { T::zero() } else { entry(j) };
-                if let Some(direction) = direction {
+                if let Some(direction) = direction.filter(|_| friction == Friction::Follows) {
                     sum += (0..tangents).map(|k| direction[k] * entry(j + 1 + k)).sum::<T>();
                 }
                 delassus.push(if i == j && positions[j] == place { sum + compliance } else { sum });
@@ -368,9 +452,9 @@ impl<T: Real> Group<T> {
 
     /// Solves the problem. Equations alone, with a symmetric W, are solved in the least norm, however rounding has
     /// changed dependent rows.
-    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, is_symmetric: bool) -> Solved<T> {
+    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
         let size = self.offset.len();
-        if is_symmetric && self.sets.iter().all(|&set| set == AdmissibleSet::Free) {
+        if friction == Friction::Lags && self.sets.iter().all(|&set| set == AdmissibleSet::Free) {
             self.reserve_factor(size);
             let Self { delassus, offset, multipliers, factor, .. } = self;
             let failure = |row| ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() };

@@ -250,7 +250,7 @@ impl<T: Real> Start<'_, '_, T> {
             // The next increment, if it falls by the same factor, would be rounding. Gaps are met within their own
             // rounding, which may exceed the rounding of displacements: they are computed from coordinates.
             let bound = rounding(scale) + noise;
-            let is_balanced = size <= bound || size / before * size <= bound;
+            let is_balanced = size <= bound || before.is_finite() && size / before * size <= bound;
             before = size;
             let tolerance = noise + self.g.largest_row() * (size + rounding(scale));
             if is_balanced && is_searched {
