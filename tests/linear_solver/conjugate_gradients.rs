@@ -231,7 +231,7 @@ fn the_curvature_that_refuses_a_matrix_is_one_that_it_has() {
         let found = factor.factorize(a.as_ref()).and_then(|()| factor.solve(&mut rhs::<f64>(n)));
         match found {
             Err(Error::Indefinite { curvature, .. }) => {
-                assert!(curvature < 0.0 && curvature > least - 1e-12, "{n} {coupling}: {curvature}, not above {least}")
+                assert!(curvature < 0.0 && curvature > least - 1e-12, "{n} {coupling}: {curvature}, not above {least}");
             }
             other => panic!("{n} {coupling}: {other:?}"),
         }
