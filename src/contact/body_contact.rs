@@ -90,6 +90,8 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     /// # Errors
     ///
     /// Those of [`Mortar::new`], except that corners and edges are accepted.
+    ///
+    /// [`ContactLaw::Rigid`]: crate::ContactLaw::Rigid
     pub fn new<F: Into<Facet>, G: Into<Facet>>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],

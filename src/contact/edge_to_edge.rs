@@ -99,6 +99,8 @@ use rows::Rows;
 /// assert!((gap[0] - 0.1_f64).abs() < 1e-15);
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
+///
+/// [`Error::PassedThrough`]: crate::Error::PassedThrough
 #[derive(Debug)]
 pub struct EdgeToEdge<T: Real> {
     nodes: Nodes,
@@ -136,6 +138,13 @@ impl<T: Real> EdgeToEdge<T> {
     /// [`Error::NotFinite`] for the coordinates (index: node); [`Error::Empty`] without facets;
     /// [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
     /// [`Error::Incompatible`] at a branch of a surface, and for nodes that both surfaces have.
+    ///
+    /// [`ContactLaw::Rigid`]: crate::ContactLaw::Rigid
+    /// [`Error::Dimension`]: crate::Error::Dimension
+    /// [`Error::NotFinite`]: crate::Error::NotFinite
+    /// [`Error::Empty`]: crate::Error::Empty
+    /// [`Error::InvertedFacet`]: crate::Error::InvertedFacet
+    /// [`Error::Incompatible`]: crate::Error::Incompatible
     pub fn new<F: Into<Facet>, G: Into<Facet>>(
         coordinates: &[[T; 3]],
         dofs: &[[usize; 3]],

@@ -164,6 +164,8 @@ impl<T: Real> Mortar<T> {
     /// facets; [`Error::InvertedFacet`] for a facet without area, folded, or turned against its neighbor;
     /// [`Error::Incompatible`] at a branch of a surface, for nodes that both surfaces have, and at a convex edge (in
     /// two dimensions a corner) around which a surface turns by more than 60°.
+    ///
+    /// [`ContactLaw::Rigid`]: crate::ContactLaw::Rigid
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],

@@ -182,6 +182,8 @@ impl<T: Real> NodeToFacet<T> {
     /// # Errors
     ///
     /// Those of [`one_pass`](Self::one_pass).
+    ///
+    /// [`ContactLaw::Rigid`]: crate::ContactLaw::Rigid
     pub fn new<F: Into<Facet>, G: Into<Facet>, const D: usize>(
         coordinates: &[[T; D]],
         dofs: &[[usize; D]],
