@@ -42,7 +42,7 @@ pub struct Accuracy {
     /// Relative excess of that compliance over the parent's: [`Reduction::softening`] times the residual if tapered,
     /// otherwise zero.
     ///
-    /// [`Reduction::softening`]: crate::Reduction::softening
+    /// [`Reduction::softening`]: crate::reduction::Reduction::softening
     pub compliance: f64,
     /// The first circular frequency not in the modes (1/time). The force of a contact of duration T is resolved to
     /// times of about 1/ω: observed mean errors were about 2/(ω T) for bodies that touch at a point.
