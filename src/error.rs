@@ -255,14 +255,14 @@ pub enum Error {
     /// An iteration has found a direction along which a matrix that must be positive definite is not.
     #[error(
         "the effective matrix is not positive definite: pᵀAp is {curvature:e} of pᵀdiag(A)p along a direction p of \
-         conjugate gradients, least of all at dof {dof}; look for a body without mass or support, or a negative \
+         conjugate gradients that is largest at dof {dof}; look for a body without mass or support, or a negative \
          stiffness",
         curvature = few(*.curvature)
     )]
     Indefinite {
         /// pᵀAp over pᵀdiag(A)p.
         curvature: f64,
-        /// Degree of freedom with the smallest share in pᵀAp.
+        /// Degree of freedom at which p is largest.
         dof: usize,
     },
     /// The iterative solution of a linear system did not converge.
