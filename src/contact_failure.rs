@@ -1,7 +1,6 @@
 //! Why a contact problem was not solved: plain data, returned by contact solvers and carried by errors.
 
-use crate::error::few;
-use crate::real::Real;
+use crate::error::text::few;
 
 /// Why a contact problem was not solved; row numbers refer to the problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,19 +50,19 @@ pub enum ContactFailure<T> {
     },
 }
 
-impl<T: Real> std::fmt::Display for ContactFailure<T> {
+impl<T: Copy + Into<f64>> std::fmt::Display for ContactFailure<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Contradictory { row, other, residual } => {
-                let residual = few(residual.value());
+                let residual = few((*residual).into());
                 write!(f, "rows {row} and {other} contradict each other: {row} stays violated by {residual:e}")
             }
             Self::NotConverged { iterations, row, residual } => {
-                let residual = few(residual.value());
+                let residual = few((*residual).into());
                 write!(f, "not solved after {iterations} iterations: row {row} misses complementarity by {residual:e}")
             }
             Self::Jammed { row, friction, normal, coupling } => {
-                let (friction, normal, coupling) = (few(*friction), few(normal.value()), few(coupling.value()));
+                let (friction, normal, coupling) = (few(*friction), few((*normal).into()), few((*coupling).into()));
                 write!(
                     f,
                     "the contact of row {row} jams: with μ = {friction} friction moves its gap by {friction} × \
@@ -84,4 +83,4 @@ impl<T: Real> std::fmt::Display for ContactFailure<T> {
     }
 }
 
-impl<T: Real> std::error::Error for ContactFailure<T> {}
+impl<T: Copy + Into<f64> + std::fmt::Debug> std::error::Error for ContactFailure<T> {}

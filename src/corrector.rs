@@ -9,6 +9,7 @@ mod laursen_love;
 mod nonsmooth_splitting;
 mod persistency;
 mod prediction;
+mod rebounds;
 mod release;
 mod switching;
 mod work_balance;

@@ -1,7 +1,7 @@
 //! The error type of the crate: every variant carries its numbers and says what to do.
 
 mod check;
-mod text;
+pub(crate) mod text;
 
 #[cfg(test)]
 mod page;

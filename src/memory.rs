@@ -1,11 +1,11 @@
 //! Large allocations that return an error instead of aborting, and scratch memory that can be cloned.
 
 use crate::error::{Error, Result};
-use crate::real::Real;
 use faer::dyn_stack::{MemBuffer, StackReq};
+use num_traits::Zero;
 
 /// A zero vector of `rows · columns` entries.
-pub(crate) fn zeros<T: Real>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
+pub(crate) fn zeros<T: Zero + Clone>(rows: usize, columns: usize, what: &'static str) -> Result<Vec<T>> {
     let mut vector = Vec::new();
     grow(&mut vector, rows, columns, what)?;
     Ok(vector)
@@ -25,7 +25,12 @@ pub(crate) fn make_room<T>(vector: &mut Vec<T>, entries: usize, what: &'static s
 }
 
 /// Resizes a vector to `rows · columns` entries, new ones zero; nonzero capacity at least doubles when it must grow.
-pub(crate) fn grow<T: Real>(vector: &mut Vec<T>, rows: usize, columns: usize, what: &'static str) -> Result<()> {
+pub(crate) fn grow<T: Zero + Clone>(
+    vector: &mut Vec<T>,
+    rows: usize,
+    columns: usize,
+    what: &'static str,
+) -> Result<()> {
     let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
     match vector.capacity() {
         0 => *vector = reserve(size, 1, what)?,

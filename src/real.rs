@@ -29,7 +29,7 @@ use stored::Stored;
 ///
 /// Time, step size and scheme coefficients are `f64` in every run; `Real` is the type of matrices and vectors.
 pub trait Real:
-    Kernels + Stored + Float + NumAssign + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
+    Kernels + Stored + Float + NumAssign + Into<f64> + Default + Debug + Display + LowerExp + Sum + Send + Sync + 'static
 {
     /// The scalar nearest to `x`.
     fn of(x: f64) -> Self;

@@ -22,6 +22,5 @@ pub(crate) use stage::massless::MasslessBlock;
 pub use stage::newton::{Iteration, Newton};
 pub use start::InitialOverclosure;
 pub use start::balance::StartAdjustment;
-pub(crate) use start::overclosures::Overclosures;
 pub use start::problem::StartImpact;
 pub use step::judge::StepControl;

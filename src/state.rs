@@ -6,6 +6,7 @@ mod checkpoint;
 mod clock;
 mod contacts;
 mod history;
+mod overclosures;
 #[cfg(feature = "serde")]
 mod parts;
 #[cfg(feature = "serde")]
@@ -21,6 +22,7 @@ pub(crate) use contacts::Names;
 pub use contacts::{ContactState, ContactStatus};
 pub(crate) use history::ComputedMotions;
 pub use history::History;
+pub(crate) use overclosures::Overclosures;
 
 use crate::contact::BrokenBond;
 use crate::real::Real;

@@ -11,6 +11,7 @@ mod rates;
 mod rows;
 mod second_order;
 mod strength;
+mod sums;
 
 use super::affine_rows::SearchState;
 use super::surface::{Bounds, Facet, Nodes, Point, RECOVERY, Surface, Vicinity, sub};

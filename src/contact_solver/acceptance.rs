@@ -1,7 +1,7 @@
 //! When a contact problem counts as solved: initial guess, the rule of acceptance, and failures, for all solvers.
 
 use super::structure::{Structure, Symmetry};
-use super::{AdmissibleSet, ContactFailure, ContactProblem, sweeps};
+use super::{AdmissibleSet, ContactFailure, ContactProblem};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::{conditioned_share, half_digits, rounding, smallest_gap};
@@ -180,7 +180,7 @@ fn jammed<T: Real>(problem: &ContactProblem<'_, T>) -> Option<ContactFailure<T>>
             let mut others = problem.row(i).iter().enumerate().filter(|(j, _)| !rows.contains(j));
             others.all(|(_, &w)| w == T::zero())
         };
-        let jams = rows.clone().all(is_apart) && sweeps::free_block(problem, rows.clone(), set).jams();
+        let jams = rows.clone().all(is_apart) && problem.block(rows.clone(), set).jams();
         let normal = problem.delassus(row, row);
         let coupling = rows.skip(1).fold(T::zero(), |size, k| size.hypot(problem.delassus(row, k)));
         jams.then_some(ContactFailure::Jammed { row, friction, normal, coupling })

@@ -9,8 +9,8 @@ use crate::real::Real;
 use crate::rounding::rounding;
 
 /// Newton's method on the conditions of [`AdmissibleSet::residual`] (Alart and Curnier 1991), started from sweeps
-/// over the blocks, and started again from more sweeps if it does not end. On redundant rows neither may end; the problem is then solved by proximal steps, each with a
-/// positive definite W.
+/// over the blocks, and started again from more sweeps if it does not end. On redundant rows neither may end; the
+/// problem is then solved by proximal steps, each with a positive definite W.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConeNewton<T> {
     sweeps: Sweeps<T>,

@@ -1,6 +1,6 @@
 //! The complementarity problem of a step.
 
-use super::cone;
+use super::cone::{self, Cone};
 use crate::contact::ContactLaw;
 use crate::dense::dot;
 use crate::error::{Error, Result};
@@ -282,6 +282,21 @@ impl<'a, T: Real> ContactProblem<'a, T> {
             *first = rows.end;
             Some((rows, set))
         })
+    }
+
+    /// A contact with friction with the multipliers of all others at zero.
+    pub(super) fn block(&self, rows: Range<usize>, set: AdmissibleSet) -> Cone<T> {
+        let (size, friction) = (rows.len(), T::of(set.friction().unwrap_or(0.0)));
+        let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
+        for (i, row) in rows.clone().enumerate() {
+            delassus[i][..size].copy_from_slice(&self.row(row)[rows.clone()]);
+            offset[i] = self.offset[row];
+            if i > 0 {
+                noise = noise.max(self.tolerance[row] + rounding(self.offset[row].abs()));
+            }
+        }
+        let guess = [T::zero(); 2];
+        Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
     }
 
     /// Number of rows.

@@ -6,7 +6,6 @@ use super::cone::Cone;
 use super::structure::Symmetry;
 use super::{AdmissibleSet, ContactProblem};
 use crate::real::Real;
-use crate::rounding::rounding;
 use std::ops::Range;
 
 /// The memory of sweeps. A symmetric W is read once per sweep, row by row up to the diagonal: the contributions of
@@ -156,7 +155,7 @@ impl<T: Real> Sweeps<T> {
         let (first, size) = (rows.start, rows.len());
         let reads = if self.reads_half() { first } else { problem.size() };
         let others = products(problem, rows.clone(), &multipliers[..reads]);
-        let mut block = free_block(problem, rows.clone(), set);
+        let mut block = problem.block(rows.clone(), set);
         for (i, row) in rows.enumerate() {
             block.offset[i] += others[i];
             if self.reads_half() {
@@ -172,21 +171,6 @@ impl<T: Real> Sweeps<T> {
         }
         block
     }
-}
-
-/// A block with the others at zero.
-pub(super) fn free_block<T: Real>(problem: &ContactProblem<'_, T>, rows: Range<usize>, set: AdmissibleSet) -> Cone<T> {
-    let (size, friction) = (rows.len(), T::of(set.friction().unwrap_or(0.0)));
-    let (mut delassus, mut offset, mut noise) = ([[T::zero(); 3]; 3], [T::zero(); 3], T::zero());
-    for (i, row) in rows.clone().enumerate() {
-        delassus[i][..size].copy_from_slice(&problem.row(row)[rows.clone()]);
-        offset[i] = problem.offset[row];
-        if i > 0 {
-            noise = noise.max(problem.tolerance[row] + rounding(problem.offset[row].abs()));
-        }
-    }
-    let guess = [T::zero(); 2];
-    Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
 }
 
 /// Rows of W times the multipliers of the first rows.

@@ -1,7 +1,7 @@
 //! Memory of the corrections, reserved when a simulation is built.
 
-use super::correction::Rebounds;
 use super::jump_problem::JumpProblem;
+use super::rebounds::Rebounds;
 use super::switching::Switching;
 use crate::contact::GapRates;
 use crate::contact_solver::FORESEEN;

@@ -16,7 +16,6 @@ use crate::real::Real;
 use crate::simulation::{MasslessBlock, Operator};
 use crate::state::{Backup, ContactState, Motion};
 use crate::system::System;
-pub(super) use restitution::Rebounds;
 
 /// One stage after its contact problem, passed to a [`Corrector`](super::Corrector).
 ///

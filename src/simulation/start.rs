@@ -149,7 +149,7 @@ impl<T: Real> Start<'_, '_, T> {
             unshifted: [Vec::new(), Vec::new()],
             slopes: self.massless.iter().map(|&dof| motion.v[dof]).collect(),
             scheme: scheme.integrator.name(),
-            overclosures: self.constraints.overclosures().cloned(),
+            overclosures: self.constraints.offsets.overclosures().cloned(),
         };
         let state = State { motion, rates, contacts, broken: Vec::new() };
         check_state(h, &state)?;

@@ -64,7 +64,7 @@ impl<T: Real> Simulation<'_, T> {
             parts.contact_solver.reserve(constraints.room());
         }
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
-        constraints.add_kept(&mut work.contact.trial.gap);
+        constraints.offsets.add_kept(&mut work.contact.trial.gap);
         if let Some(ledger) = &mut monitors.ledger {
             ledger.begin((constraints, g), state, &work.contact.trial.lambda)?;
         }

@@ -1,9 +1,8 @@
 //! The past of a run.
 
-use super::{Clock, Motion, Pace};
+use super::{Clock, Motion, Overclosures, Pace};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::Overclosures;
 
 /// The past states that a multistep scheme reads, and the clock of the run.
 #[derive(Clone, Debug)]

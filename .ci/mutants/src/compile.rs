@@ -1,6 +1,7 @@
 //! The copy of the package that has all drawn mutants, and what compiles of it.
 
 use crate::draw::{self, Draw};
+use crate::files::{failed, put, read};
 use crate::schema::{self, Place};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,25 +25,6 @@ pub struct Package {
 pub struct Binary {
     pub name: String,
     pub executable: PathBuf,
-}
-
-fn failed(what: &Path, error: &std::io::Error) -> String {
-    format!("{}: {error}", what.display())
-}
-
-pub fn read(path: &Path) -> Result<String, String> {
-    fs::read_to_string(path).map_err(|error| failed(path, &error))
-}
-
-/// Writes a file unless it is there already: its time tells cargo whether to compile it again.
-pub fn put(path: &Path, content: &[u8]) -> Result<(), String> {
-    if fs::read(path).is_ok_and(|there| there == content) {
-        return Ok(());
-    }
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|error| failed(folder, &error))?;
-    }
-    fs::write(path, content).map_err(|error| failed(path, &error))
 }
 
 impl Package {

@@ -77,6 +77,6 @@ impl Draw {
         };
         self.not_compiling.extend(keys);
         let lines: Vec<&str> = self.not_compiling.iter().map(String::as_str).collect();
-        crate::compile::put(&self.file, lines.join("\n").as_bytes())
+        crate::files::put(&self.file, lines.join("\n").as_bytes())
     }
 }

@@ -23,14 +23,16 @@
 
 mod compile;
 mod draw;
+mod files;
 mod find;
 mod rooms;
 mod schema;
 mod suite;
 mod table;
 
-use compile::{Package, put, read};
+use compile::Package;
 use draw::Draw;
+use files::{put, read};
 use find::Mutant;
 use rooms::{ROOMS, Room, SAMPLE};
 use std::collections::BTreeMap;

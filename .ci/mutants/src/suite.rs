@@ -1,6 +1,7 @@
 //! The tests: which there are, what they reach, and whether they see a mutant.
 
-use crate::compile::{Binary, put, read};
+use crate::compile::Binary;
+use crate::files::{put, read};
 use crate::rooms::Room;
 use std::collections::BTreeSet;
 use std::fs;

@@ -8,9 +8,9 @@
 //! with c a smooth function of the covered share κ of the facet's area, zero up to [`ENOUGH`]. All integrals are
 //! linear in N. They are found with N, and multiplied by B = I + c (A − I). Derivatives also have δB = c′ (A − I) δκ.
 
-use super::integrals::Sums;
 use super::points::{Column, column};
-use crate::contact::surface::{Base, Facet, add_scaled, middle, norm};
+use super::sums::{Sums, area, factor};
+use crate::contact::surface::{Base, Facet, add_scaled, middle};
 
 /// The weights of gaps: standard or dual shape functions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,16 +107,6 @@ impl Blend {
             );
         }
     }
-}
-
-/// A facet's area divided by the length of the product of its tangents at the middle.
-fn factor(count: usize) -> f64 {
-    [1.0, 0.5, 4.0][count - 2]
-}
-
-/// The area of a facet in its plane.
-pub(super) fn area(base: &Base) -> f64 {
-    norm(base.product) * factor(base.count())
 }
 
 #[cfg(test)]

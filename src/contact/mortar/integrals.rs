@@ -14,13 +14,13 @@
 //! With offsets o of the surfaces from their facets the gap is n·(x_m − x_s) − o_s − o_m. Then μ + ∇o_m multiplies
 //! δx_m − δx_s − (n·(x_m − x_s)) δn, with the gradient ∇o_m of o_m by the motion of the intersection.
 
-use super::dual::{self, Blend, Multiplier};
+use super::dual::{Blend, Multiplier};
 use super::pairs::Pairs;
 use super::parts::Parts;
 use super::points::{self, Addends, Column, NORMAL, OTHERS, OWN, Points, column};
 use super::second_order::{Pair, Shares};
+use super::sums::Sums;
 use crate::contact::surface::{Base, Facet, Offsets, Point, RimSample, Sample, Surface, add_scaled, dot};
-use crate::rounding::LEAST_COVER;
 
 impl Offsets<'_> {
     /// The offsets at the corners of a slave facet and of a master facet, without the factor.
@@ -37,82 +37,6 @@ impl Outside {
     fn at(&self, slave: &[f64; 4], master: &[f64; 4]) -> f64 {
         let Self([own, others]) = self;
         (0..4).map(|k| slave[k] * own[k] + master[k] * others[k]).sum()
-    }
-}
-
-/// Integrals for a slave node; N are its weights, standard or dual.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
-    /// ∫N dA over the covered part, and over all facets of the node.
-    pub(super) area: f64,
-    whole: f64,
-    /// ∫N g dA.
-    pub(super) moment: f64,
-    /// ∫N o dA with the offsets of both surfaces.
-    offset: f64,
-    /// ∫N x dA, and −∫N μ dA.
-    position: Point,
-    normal: Point,
-}
-
-impl Sums {
-    /// Adds the area of a slave facet to the sums of its nodes; returns their places.
-    fn begin<'s>(sums: &mut [Self], slave: &'s Surface, facet: usize, base: &Base) -> &'s [usize; 4] {
-        let (places, count) = (slave.places(facet), base.count());
-        let whole = dual::area(base) / count as f64;
-        places[..count].iter().for_each(|&place| sums[place].whole += whole);
-        places
-    }
-
-    /// Adds the covered part of a slave facet to the sums of its nodes.
-    fn end(sums: &mut [Self], places: &[usize], own: &[Self; 4]) {
-        places.iter().zip(own).for_each(|(&place, own)| sums[place].add_scaled(1.0, own));
-    }
-
-    /// Adds all integrals over the covered part.
-    pub(super) fn add_scaled(&mut self, factor: f64, other: &Self) {
-        self.area += factor * other.area;
-        self.moment += factor * other.moment;
-        self.offset += factor * other.offset;
-        self.position = add_scaled(self.position, factor, other.position);
-        self.normal = add_scaled(self.normal, factor, other.normal);
-    }
-
-    /// Adds a quadrature point, for a node with the shape function `share` there.
-    fn add(&mut self, share: f64, area: f64, gap: f64, offset: f64) {
-        let weight = share * area;
-        self.area += weight;
-        self.moment += weight * gap;
-        self.offset += weight * offset;
-    }
-
-    /// Whether the covered part is large enough for a row.
-    pub(super) fn is_covered(&self) -> bool {
-        self.area > LEAST_COVER * self.whole
-    }
-
-    /// The mean of the gap with the weights of the node.
-    pub(super) fn gap(&self) -> f64 {
-        self.moment / self.area
-    }
-
-    /// As [`gap`](Self::gap); NaN unless the covered part is large enough.
-    pub(super) fn gap_if_covered(&self) -> f64 {
-        if self.is_covered() { self.gap() } else { f64::NAN }
-    }
-
-    /// The mean of the offsets of both surfaces, at full size.
-    pub(super) fn offset(&self) -> f64 {
-        self.offset / self.area
-    }
-
-    pub(super) fn position(&self) -> Point {
-        self.position.map(|x| x / self.area)
-    }
-
-    /// The mean direction in which the gap opens.
-    pub(super) fn normal(&self) -> Option<Point> {
-        crate::contact::surface::unit(self.normal)
     }
 }
 

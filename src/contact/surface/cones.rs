@@ -19,7 +19,7 @@ pub(super) struct Cone {
 impl Cone {
     fn of(shape: &Shape) -> Self {
         let unknown = Self { axis: [0.0; 3], sine: f64::INFINITY };
-        let Some(axis) = shape.normal(&super::middle(shape.corners().len())) else { return unknown };
+        let Some(axis) = shape.normal(&super::shape::middle(shape.corners().len())) else { return unknown };
         let mut most = 0.0_f64;
         for product in shape.extreme_products(BEYOND) {
             let turned = cross(axis, product);

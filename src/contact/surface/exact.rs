@@ -8,7 +8,7 @@
 //! parts are exact, and so are the nodal forces of a constant pressure. The weights of the rule are changed as little
 //! as possible to match the integral while ∫ dA and ∫ x dA stay.
 
-use super::overlap::Flat;
+use super::flat::Flat;
 use super::polygon::{cross, difference};
 use crate::rounding::{DEPENDENT, SKEWED};
 

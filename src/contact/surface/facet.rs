@@ -1,8 +1,7 @@
 //! A facet, given by the indices of its nodes.
 
-use super::middle;
 use super::second_order::{ByNode, Kind, Whole};
-use super::shape::{Point, Shape, add_scaled, sub};
+use super::shape::{Point, Shape, add_scaled, middle, sub};
 
 /// A facet of a surface: the indices of its 2, 3 or 4 nodes.
 ///

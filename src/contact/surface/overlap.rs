@@ -5,11 +5,11 @@
 //! 2004, section 4). In two dimensions it is a part of a line.
 
 use super::exact::{RulePoint, RulePoints};
-use super::offsets::range;
-use super::polygon::{Polygon, Rule, cross as cross_in_plane, difference};
-use super::shape::{Point, Shape, add_scaled, cross, dot, norm, sub, unit};
+use super::flat::Flat;
+use super::polygon::Rule;
+use super::shape::{Point, Shape, add_scaled, cross, dot, middle, norm, sub, unit};
 use super::{Facet, Surface};
-use crate::rounding::{SLIVER, rounding};
+use crate::rounding::SLIVER;
 
 /// A quadrature point on the part of a slave facet that a master facet covers.
 #[derive(Clone, Copy, Debug)]
@@ -55,12 +55,6 @@ pub(crate) struct Base {
     beside: [Option<[Point; 2]>; 4],
     /// Whether it is a part of a facet of second order.
     curved: bool,
-}
-
-/// The shape functions at the middle of a facet.
-pub(crate) fn middle(count: usize) -> [f64; 4] {
-    let share = 1.0 / count as f64;
-    std::array::from_fn(|k| if k < count { share } else { 0.0 })
 }
 
 /// Least cosine between the normal of a facet and the reversed normal of another one in contact: 60 degrees.
@@ -346,86 +340,6 @@ impl Base {
         let [by_first, by_second] = [cross(second, vector), cross(vector, first)];
         let [one, other] = self.shape.derivatives(weights);
         std::array::from_fn(|k| add_scaled(by_first.map(|x| one[k] * x), other[k], by_second))
-    }
-}
-
-/// A triangle or a quadrilateral in a plane.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Flat {
-    pub(super) corners: [[f64; 2]; 4],
-    pub(super) count: usize,
-}
-
-impl Flat {
-    /// The shape functions at a point. For quadrilaterals by Newton's method, which takes one iteration on
-    /// parallelograms.
-    #[inline]
-    pub(super) fn weights_at(&self, p: [f64; 2]) -> [f64; 4] {
-        const ITERATIONS: usize = 12;
-        let r = difference(p, self.corners[0]);
-        let solve = |a: [f64; 2], b: [f64; 2], r: [f64; 2]| {
-            let determinant = cross_in_plane(a, b);
-            [cross_in_plane(r, b) / determinant, cross_in_plane(a, r) / determinant]
-        };
-        if self.count == 3 {
-            let [a, b] = [1, 2].map(|k| difference(self.corners[k], self.corners[0]));
-            let [s, t] = solve(a, b, r);
-            return [1.0 - s - t, s, t, 0.0];
-        }
-        // Coordinates from 0 to 1: x = x₀ + s a + t b + s t c.
-        let [a, b, c] = self.sides();
-        let size = a.iter().chain(&b).fold(0.0_f64, |size, x| size.max(x.abs()));
-        let skew = c[0].abs().max(c[1].abs());
-        let [mut s, mut t] = [0.5; 2];
-        for _ in 0..ITERATIONS {
-            let missing = std::array::from_fn(|i| r[i] - s * a[i] - t * b[i] - s * t * c[i]);
-            let [by_s, by_t] = [std::array::from_fn(|i| a[i] + t * c[i]), std::array::from_fn(|i| b[i] + s * c[i])];
-            let [ds, dt] = solve(by_s, by_t, missing);
-            (s, t) = (s + ds, t + dt);
-            // The residual is now ds dt c.
-            if (ds * dt).abs() * skew <= rounding(size) {
-                break;
-            }
-        }
-        [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
-    }
-
-    /// The interval of a line segment, in shares of its length, that lies inside; none if it is empty.
-    fn crossing(&self, from: [f64; 2], way: [f64; 2]) -> Option<[f64; 2]> {
-        let (mut begin, mut end) = (0.0_f64, 1.0_f64);
-        for k in 0..self.count {
-            let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
-            let side = difference(b, a);
-            // Height of the start over the side, and its gain along the segment.
-            let (height, gain) = (cross_in_plane(side, difference(from, a)), cross_in_plane(side, way));
-            if gain > 0.0 {
-                begin = begin.max(-height / gain);
-            } else if gain < 0.0 {
-                end = end.min(-height / gain);
-            } else if height < 0.0 {
-                return None;
-            }
-        }
-        (begin < end).then_some([begin, end])
-    }
-
-    /// The common part with another polygon of opposite orientation, if its area is above `least` (Sutherland and
-    /// Hodgman, Commun. ACM 17, 1974).
-    #[inline]
-    fn common(&self, other: &Self, least: f64) -> Option<Polygon> {
-        let is_apart = |axis: usize| {
-            let ends = [self, other].map(|flat| range(flat.corners[..flat.count].iter().map(|x| x[axis])));
-            ends[0][0] > ends[1][1] || ends[1][0] > ends[0][1]
-        };
-        if is_apart(0) || is_apart(1) {
-            return None;
-        }
-        let mut polygon = Polygon::default();
-        other.corners[..other.count].iter().rev().for_each(|&corner| polygon.push(corner));
-        for k in 0..self.count {
-            polygon = polygon.cut(self.corners[k], self.corners[(k + 1) % self.count]);
-        }
-        (polygon.area() > least).then_some(polygon)
     }
 }
 

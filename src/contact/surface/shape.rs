@@ -464,6 +464,12 @@ impl Foot {
     }
 }
 
+/// The shape functions at the middle of a facet.
+pub(crate) fn middle(count: usize) -> [f64; 4] {
+    let share = 1.0 / count as f64;
+    std::array::from_fn(|k| if k < count { share } else { 0.0 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

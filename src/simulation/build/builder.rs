@@ -524,7 +524,7 @@ fn find_resumed_contacts<T: Real>(
     constraints.search(&state.motion, scheme.ahead() * h, g)?;
     constraints.check_rows(g, prescribed, state.motion.t, &state.motion.u)?;
     if let Some(overclosures) = &history.overclosures {
-        constraints.adjust(overclosures.clone());
+        constraints.offsets.adjust(overclosures.clone(), &constraints.ids);
     }
     // A past that is resampled at once is projected onto gaps as the last step has measured them.
     constraints.keep_depths(&state.motion, 0.0)?;

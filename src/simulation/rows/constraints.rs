@@ -2,7 +2,7 @@
 
 use crate::contact::{
     BrokenBond, Candidates, ContactConstraint, ContactId, ContactJacobian, Contacts, GapRates, NO_RESPONSE, Stride,
-    Tangents, Variation,
+    Tangents, Variation, kept_depth,
 };
 use crate::contact_solver::AdmissibleSet;
 use crate::error::{Error, Result};
@@ -202,6 +202,38 @@ impl<'a, T: Real> Constraints<'a, T> {
         self.ahead = ahead;
         self.offsets.clear_kept();
         self.read_stale(jacobian)
+    }
+
+    /// [`search`](Self::search) at the start of a step, then [`keep_depths`](Self::keep_depths) with the recovery of
+    /// each [contact](crate::contact::Contact::recovery). `share` is the step size over the size of a whole step:
+    /// without it, halved steps would recover penetration too fast.
+    pub(crate) fn search_for_step(
+        &mut self,
+        motion: &Motion<T>,
+        (ahead, share): (f64, f64),
+        jacobian: &mut ContactJacobian<T>,
+    ) -> Result<Candidates> {
+        let found = self.search(motion, ahead, jacobian)?;
+        self.keep_depths(motion, share)?;
+        Ok(found)
+    }
+
+    /// Offsets each gap by the penetration at `motion` that exceeds `share` times the recovery of a whole step. A
+    /// share of 0 keeps the penetration that the last step has left.
+    pub(crate) fn keep_depths(&mut self, motion: &Motion<T>, share: f64) -> Result<()> {
+        self.offsets.clear_kept();
+        if self.offsets.recoveries.iter().all(|recovery| recovery.is_infinite()) {
+            return Ok(());
+        }
+        let mut kept = std::mem::take(&mut self.offsets.kept);
+        kept.reserve(self.room());
+        kept.resize(self.len(), T::zero());
+        let evaluated = self.finite_gaps(motion.t, &motion.u, &mut kept);
+        for (kept, &recovery) in kept.iter_mut().zip(&self.offsets.recoveries) {
+            *kept = if recovery.is_infinite() { T::zero() } else { kept_depth(*kept, T::of(share) * recovery) };
+        }
+        self.offsets.kept = kept;
+        evaluated.inspect_err(|_| self.offsets.clear_kept())
     }
 
     /// Lets every constraint inspect the step that is about to be accepted.

@@ -6,11 +6,11 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::{rounding, touching};
 use crate::simulation::build::program::{CompiledStage, ContactTarget};
+use crate::simulation::operator::Operator;
 use crate::simulation::rows::constraints::Constraints;
 use crate::simulation::rows::curved_rows::CurvedRowsWork;
 use crate::simulation::rows::massless_rows::MasslessRows;
 use crate::simulation::rows::problem_rows::ProblemRows;
-use crate::simulation::rows::row_state::RowState;
 use crate::state::{Clock, Motion};
 
 /// The contact rows of a stage, one entry per row of G: candidates, then tangential rows.
@@ -30,6 +30,33 @@ pub(crate) struct ContactRowsWork<T> {
     pub(crate) problem: ProblemRows<T>,
     pub(crate) rates: Vec<GapRates<T>>,
     pub(crate) slips: Slips<T>,
+}
+
+/// The part of a row in the contact problem of a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowState {
+    /// The row may not carry a force in this stage: its forecast gap, or its gap at the start, is open.
+    Disabled,
+    /// The row may carry a force, and is not in the problem so far.
+    Open,
+    /// The row is in the contact problem.
+    InProblem,
+    /// The normal force of the row is known: it is in the problem for its friction.
+    Known,
+}
+
+impl RowState {
+    pub(super) fn enabled_if(may_carry_force: bool) -> Self {
+        if may_carry_force { Self::Open } else { Self::Disabled }
+    }
+
+    pub(crate) fn is_enabled(self) -> bool {
+        self != Self::Disabled
+    }
+
+    pub(crate) fn is_in_problem(self) -> bool {
+        matches!(self, Self::InProblem | Self::Known)
+    }
 }
 
 /// Compliant laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
@@ -259,6 +286,36 @@ impl<T: Real> ContactRowsWork<T> {
             }
         }
         Ok(())
+    }
+
+    /// Lists the rows of the problem, group by group, and its data. Rows are divided by their weight, which makes W
+    /// symmetric for every kind of row.
+    pub(crate) fn list_problem(
+        &mut self,
+        constraints: &Constraints<'_, T>,
+        g: &ContactJacobian<T>,
+        operator: &mut Operator<T>,
+    ) {
+        let Self { y, tolerance, weight, laws, state, curved, problem, .. } = self;
+        let forces = curved.forces(g);
+        let ProblemRows { rows, sorted, offset, tolerance: problem_tolerance, sets, .. } = problem;
+        sorted.clear();
+        constraints.tangents().expand((0..constraints.len()).filter(|&row| state[row].is_in_problem()), sorted);
+        operator.sort(forces, sorted);
+        rows.clear();
+        rows.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
+        offset.clear();
+        problem_tolerance.clear();
+        sets.clear();
+        for &row in rows.iter() {
+            // A row with a known force has no weight.
+            let known = weight[row] == T::zero();
+            offset.push(if known { T::zero() } else { (y[row] + laws.shift[row]) / weight[row] });
+            problem_tolerance.push(if known { T::zero() } else { tolerance[row] / weight[row] });
+            if !forces.is_tangential(row) {
+                sets.push(constraints.set(row));
+            }
+        }
     }
 }
 

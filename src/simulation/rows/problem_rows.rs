@@ -1,18 +1,14 @@
 //! The contact problem of a stage: its rows, and its data with one entry per row of it.
 
-use crate::contact::ContactJacobian;
 use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
 use crate::real::Real;
-use crate::simulation::operator::Operator;
-use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::rows::contact_rows::ContactRowsWork;
 
 /// The contact problem of a stage.
 pub(crate) struct ProblemRows<T> {
     /// Its rows, group by group.
     pub(crate) rows: Vec<usize>,
     /// The same rows, ascending.
-    sorted: Vec<usize>,
+    pub(super) sorted: Vec<usize>,
     pub(crate) offset: Vec<T>,
     pub(crate) tolerance: Vec<T>,
     pub(crate) sets: Vec<AdmissibleSet>,
@@ -55,38 +51,6 @@ impl<T: Real> ProblemRows<T> {
         self.sets.reserve(rows);
         for values in [&mut self.offset, &mut self.tolerance, &mut self.multipliers] {
             values.reserve(rows);
-        }
-    }
-}
-
-impl<T: Real> ContactRowsWork<T> {
-    /// Lists the rows of the problem, group by group, and its data. Rows are divided by their weight, which makes W
-    /// symmetric for every kind of row.
-    pub(crate) fn list_problem(
-        &mut self,
-        constraints: &Constraints<'_, T>,
-        g: &ContactJacobian<T>,
-        operator: &mut Operator<T>,
-    ) {
-        let Self { y, tolerance, weight, laws, state, curved, problem, .. } = self;
-        let forces = curved.forces(g);
-        let ProblemRows { rows, sorted, offset, tolerance: problem_tolerance, sets, .. } = problem;
-        sorted.clear();
-        constraints.tangents().expand((0..constraints.len()).filter(|&row| state[row].is_in_problem()), sorted);
-        operator.sort(forces, sorted);
-        rows.clear();
-        rows.extend(operator.groups().positions().iter().map(|&position| sorted[position]));
-        offset.clear();
-        problem_tolerance.clear();
-        sets.clear();
-        for &row in rows.iter() {
-            // A row with a known force has no weight.
-            let known = weight[row] == T::zero();
-            offset.push(if known { T::zero() } else { (y[row] + laws.shift[row]) / weight[row] });
-            problem_tolerance.push(if known { T::zero() } else { tolerance[row] / weight[row] });
-            if !forces.is_tangential(row) {
-                sets.push(constraints.set(row));
-            }
         }
     }
 }

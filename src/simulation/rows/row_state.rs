@@ -6,37 +6,10 @@ use crate::corrector::Gaps;
 use crate::real::Real;
 use crate::rounding::{rounding, touching};
 use crate::simulation::rows::constraints::Constraints;
-use crate::simulation::rows::contact_rows::ContactRowsWork;
+use crate::simulation::rows::contact_rows::{ContactRowsWork, RowState};
 use crate::simulation::rows::massless_rows::Problem;
 use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::contact::laws::{course, slows};
-
-/// The part of a row in the contact problem of a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RowState {
-    /// The row may not carry a force in this stage: its forecast gap, or its gap at the start, is open.
-    Disabled,
-    /// The row may carry a force, and is not in the problem so far.
-    Open,
-    /// The row is in the contact problem.
-    InProblem,
-    /// The normal force of the row is known: it is in the problem for its friction.
-    Known,
-}
-
-impl RowState {
-    fn enabled_if(may_carry_force: bool) -> Self {
-        if may_carry_force { Self::Open } else { Self::Disabled }
-    }
-
-    pub(crate) fn is_enabled(self) -> bool {
-        self != Self::Disabled
-    }
-
-    pub(crate) fn is_in_problem(self) -> bool {
-        matches!(self, Self::InProblem | Self::Known)
-    }
-}
 
 /// Whether a row whose rate is constrained may carry a force: its forecast `gap` touches, or its law acts on open
 /// contacts too. `approach` is the change of the gap in the step. The second value is the gap beyond its `rounding` by

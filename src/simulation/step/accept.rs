@@ -129,7 +129,7 @@ impl<T: Real> Simulation<'_, T> {
         history.slots[1..].rotate_left(work.backup.rotations - 1);
         std::mem::swap(&mut state.motion, &mut history.slots[0]);
         std::mem::swap(&mut state.rates, &mut work.rates);
-        constraints.subtract_kept(&mut work.contact.trial.gap);
+        constraints.offsets.subtract_kept(&mut work.contact.trial.gap);
         std::mem::swap(&mut state.contacts, &mut work.contact.trial);
         work.contact.impulses.accept();
         constraints.break_bonds(state.contacts.forces(), state.motion.t, &mut state.broken);

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::touching;
 use crate::simulation::rows::contact_rows::Level;
-use crate::simulation::rows::row_state::RowState;
+use crate::simulation::rows::contact_rows::RowState;
 use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::contact::ContactWork;
 
