@@ -443,8 +443,8 @@ pub enum Error {
     /// change.
     #[error(
         "contact {contact}: between t = {:e} and {:e} displacements change its gap by {:e}, along its row of G by \
-         {:e}, and its constraint says that rows do not change; return `Candidates::Changed` from `search` and `follow` when \
-         they do, and check them with `verify::gap_jacobian`",
+         {:e}, and its constraint says that rows do not change; return `Candidates::Changed` from `search` and \
+         `follow` when they do, and check them with `verify::gap_jacobian`",
         .t[0], .t[1], .change[0], .change[1]
     )]
     SilentTurn {

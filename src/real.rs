@@ -41,7 +41,8 @@ pub trait Real:
 macro_rules! kernels {
     ($(
         $(#[$doc:meta])*
-        fn $name:ident $(<const $n:ident: usize>)? ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $kernel:path;
+        fn $name:ident $(<const $n:ident: usize>)?
+            ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $kernel:path;
     )*) => {
         /// Kernels instantiated in this crate; hidden, because only this crate calls or implements them.
         #[doc(hidden)]

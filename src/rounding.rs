@@ -24,9 +24,9 @@ pub(crate) fn share_of_rounding<T: Float>() -> T {
 }
 
 /// √ε, half of the digits: values that agree to this share agree as far as solves with a matrix of unknown condition
-/// can tell; the share by which values are changed for a difference that keeps half of the digits, and by which rounding
-/// may move a solved force beyond its bound. Distances below this share of the size of a facet have no direction; entries of a rotation differ by less
-/// from those of an orthonormal matrix.
+/// can tell; the share by which values are changed for a difference that keeps half of the digits, and by which
+/// rounding may move a solved force beyond its bound. Distances below this share of the size of a facet have no
+/// direction; entries of a rotation differ by less from those of an orthonormal matrix.
 pub(crate) fn half_digits<T: Float>() -> T {
     T::epsilon().sqrt()
 }
@@ -146,8 +146,8 @@ pub(crate) const ALTERNATION: f64 = 0.999;
 /// Displacements of dofs without mass have converged if the largest increment is this share of the first one.
 pub(crate) const STATIC_INCREMENT: f64 = 1e-9;
 
-/// An increment of Newton's method, over ε times the displacements, up to which a residual that has no scale may end the
-/// iteration by stagnating.
+/// An increment of Newton's method, over ε times the displacements, up to which a residual that has no scale may end
+/// the iteration by stagnating.
 pub(crate) const SMALL_INCREMENT: f64 = 1e4;
 
 /// The largest compliance of a contact, over the diagonal entry of W: ε⁻⁴. The force of a softer contact is lost to

@@ -78,8 +78,9 @@ const BEYOND: f64 = 0.25;
 /// its path, or half of the [reach](SurfaceSettings::reach). Geometry is computed in `f64` in every run.
 ///
 /// Facets that penetrate each other by more than half of the material behind both, in the reference configuration,
-/// face each other through the bodies and are not in contact. So bodies may be thinner than the [reach](SurfaceSettings::reach)
-/// if their whole surfaces are given. As thin bodies have edges, use [`BodyContact`](super::BodyContact) for them.
+/// face each other through the bodies and are not in contact. So bodies may be thinner than the
+/// [reach](SurfaceSettings::reach) if their whole surfaces are given. As thin bodies have edges, use
+/// [`BodyContact`](super::BodyContact) for them.
 ///
 /// # Known failure
 ///
@@ -246,8 +247,8 @@ impl<T: Real> Mortar<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] with [offsets](SurfaceSettings::offsets) or [`dual`](Self::dual). If the surfaces do not touch
-    /// anywhere, the first search fails ([`Error::Empty`]).
+    /// [`Error::Incompatible`] with [offsets](SurfaceSettings::offsets) or [`dual`](Self::dual). If the surfaces do not
+    /// touch anywhere, the first search fails ([`Error::Empty`]).
     pub fn bonded(mut self, strength: BondStrength) -> Result<Self> {
         self.bonds = Some(Bonds::new(self.nodes.clone(), self.surfaces.clone(), strength));
         self.check_bonds()?;

@@ -65,7 +65,7 @@ pub(crate) const RECOVERY: f64 = 1e-4;
 /// let upper = Surface::of_cells(&coordinates, [[4, 5, 6, 7]])?;
 /// let contact = BodyContact::new(&coordinates, &dofs, &upper, &lower)?;
 ///
-/// // The upper side of the lower square bears 3 on each of its nodes, downward, of which half of the side is their own.
+/// // The upper side of the lower square bears 3 on each of its nodes, downward; half of the side belongs to each.
 /// let mut forces = [[0.0; 2]; 8];
 /// (forces[2], forces[3]) = ([0.0, -3.0], [0.0, -3.0]);
 /// let pressures = lower.pressures(&coordinates, &forces)?;

@@ -112,8 +112,8 @@ fn reserve<V>(lists: &mut [&mut Vec<V>], entries: usize) {
 
 impl<T: Real> Buffers<T> {
     /// Reserves memory for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), for predictions
-    /// of `predicted` dofs (0 without), and, if contacts without mass are corrected, for velocity changes of `switching`
-    /// dofs.
+    /// of `predicted` dofs (0 without), and, if contacts without mass are corrected, for velocity changes of
+    /// `switching` dofs.
     pub(crate) fn new(rows: usize, [damped, predicted]: [usize; 2], switching: Option<usize>) -> Self {
         let vector = || vec![T::zero(); damped];
         let mut buffers = Self {

@@ -222,7 +222,7 @@ impl<T: Real> Operator<T> {
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
     /// `versions` is the number of versions so far.
     ///
-    /// The compliance of a power law at first touch is infinite. It is limited by a multiple of the diagonal entry of W.
+    /// The compliance of a power law at first touch is infinite: a multiple of the diagonal entry of W limits it.
     pub(crate) fn delassus(
         &mut self,
         g: &ContactJacobian<T>,

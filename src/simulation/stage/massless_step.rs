@@ -135,8 +135,8 @@ impl<'a, T: Real> StageSolve<'_, 'a, T> {
     /// Computes the velocities of dofs without mass from the parabola through their last three displacements. The rows
     /// of a scheme compute v from a, which is zero on such dofs.
     ///
-    /// `place` is the number of the stage in its step, `before` the step size before it; `slopes` are the differences of
-    /// the displacements over that step, divided by its size.
+    /// `place` is the number of the stage in its step, `before` the step size before it; `slopes` are the differences
+    /// of the displacements over that step, divided by its size.
     pub(crate) fn set_massless_rates(&mut self, place: usize, before: f64, slopes: &[T]) {
         // The state at the start of the step.
         let Some(start) = self.past.get(place) else { return };
