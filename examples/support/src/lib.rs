@@ -2,6 +2,6 @@
 
 pub mod collisions;
 pub mod output;
-pub mod plot;
+pub use example_plot as plot;
 pub mod timing;
 pub mod yardsticks;

@@ -1,7 +1,7 @@
 //! The figures: time histories of the contact nodes against the exact solution.
 
 use crate::experiment::{Correction, END, Experiment, Run, Sample, before_and_after};
-use example_support::plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, banner, page};
+use example_plot::{Axis, BLUE, Curve, DARK, GREEN, Panel, RGBColor, VERMILION, banner, page};
 use std::error::Error;
 
 /// Stroke widths in quarters of a pixel.

@@ -7,7 +7,7 @@ use std::str::FromStr;
 pub(crate) const HELP: &str = "\
 Two elastic bars collide: contact force, velocity and energy before and after correction.
 
-usage: two_bars [options]
+usage: two-bars [options]
 
   --elements N      elements a bar, 1 to 100000 (default 50)
   --step H          step size in seconds, 1e-6 to 1e-2 (default 1e-3)

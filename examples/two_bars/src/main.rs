@@ -1,8 +1,8 @@
 //! The paper's experiment: two equal elastic bars fly toward each other, collide, and swap velocities.
 //!
 //! ```text
-//! cargo run --release --example two_bars            # the paper's data, 50 elements a bar, h = 1 ms
-//! cargo run --release --example two_bars -- --help  # options
+//! cargo run --release -p two-bars            # the paper's data, 50 elements a bar, h = 1 ms
+//! cargo run --release -p two-bars -- --help  # options
 //! ```
 //!
 //! Prints how well each integrator reproduces the exact solution without correction, with the persistency correction,
@@ -50,6 +50,12 @@ impl fmt::Debug for Failure {
 /// Runs every chosen case, prints the table and writes the files.
 fn present(options: &Options) -> Result<(), Box<dyn Error>> {
     let experiment = Experiment::new(options.elements, options.step, options.phase);
+    let (schemes, corrections) = (options.schemes.len(), options.corrections.len());
+    writeln!(
+        io::stdout(),
+        "Two elastic bars fly toward each other and collide: {}, {schemes} schemes × {corrections} corrections.\n",
+        experiment.data()
+    )?;
     let mut runs = Vec::new();
     for &scheme in &options.schemes {
         for &correction in &options.corrections {
