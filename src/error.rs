@@ -684,8 +684,8 @@ fn stiffer_part(contact: Option<ContactId>) -> String {
     contact.map_or_else(|| "the system has become stiffer".into(), |contact| format!("contact {contact} is stiffer"))
 }
 
-/// Result with the crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+/// Result with the crate's [`Error`], unless another one is named.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// The host's error for a state, with the step that it belongs to.
 #[derive(Debug, thiserror::Error)]

@@ -13,7 +13,6 @@ mod reciprocal;
 mod redistribute;
 mod singular;
 
-pub(crate) use assembly::assembled;
 pub use bipenalty::bipenalty;
 pub(crate) use blend::dispersion_weight;
 pub use blend::{blend, optimal_weight};

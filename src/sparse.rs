@@ -143,6 +143,31 @@ pub(crate) fn scattered_signed(index: usize) -> f64 {
     if number & 1 == 0 { size } else { -size }
 }
 
+/// The square matrix of these entries (row, column, value); entries at the same place are summed in order.
+pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
+    entries.sort_by_key(|&(row, column, _)| (column, row));
+    let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());
+    let mut last = None;
+    for (row, column, value) in entries {
+        match values.last_mut() {
+            Some(sum) if last == Some((row, column)) => *sum += value,
+            _ => {
+                rows.push(row);
+                values.push(value);
+                pointers[column + 1] += 1;
+            }
+        }
+        last = Some((row, column));
+    }
+    for column in 0..size {
+        pointers[column + 1] += pointers[column];
+    }
+    let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
+        .to_owned()
+        .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix", bytes: None })?;
+    Ok(SparseColMat::new(pattern, values))
+}
+
 /// Entry (row, column), zero if it is not stored.
 pub(crate) fn entry<T: Real>(a: SparseColMatRef<'_, usize, T>, row: usize, column: usize) -> T {
     let rows = a.row_idx_of_col_raw(column);

@@ -37,6 +37,7 @@ use crate::tableau::{A, Rows, Stage, Tableau, U, V, Z};
 /// use contact_dynamics::{GeneralizedAlpha, TimeIntegrator, analysis};
 /// let scheme = GeneralizedAlpha::chung_hulbert(0.8)?;
 /// assert!((analysis::spectral_radius(&scheme.tableau(), 1e6, 0.0) - 0.8).abs() < 1e-4);
+/// assert_eq!(scheme, GeneralizedAlpha::default());
 /// # Ok::<(), contact_dynamics::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +49,13 @@ pub struct GeneralizedAlpha {
     alpha_f: f64,
     beta: f64,
     gamma: f64,
+}
+
+impl Default for GeneralizedAlpha {
+    /// The default of this crate: Chung and Hulbert's scheme with ρ∞ = 0.8.
+    fn default() -> Self {
+        Self::of_radius(0.8)
+    }
 }
 
 impl GeneralizedAlpha {

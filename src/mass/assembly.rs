@@ -1,9 +1,8 @@
-//! Matrices assembled from lists of entries, and checks of elements and of lists of dofs.
+//! Checks of elements and of lists of dofs.
 
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
-use faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 
 /// Rejects dofs that the system does not have.
 pub(super) fn check_dofs(what: &'static str, dofs: &[usize], size: usize) -> Result<()> {
@@ -21,31 +20,6 @@ pub(super) fn flags(what: &'static str, list: &[usize], size: usize) -> Result<V
         flags[dof] = true;
     }
     Ok(flags)
-}
-
-/// The square matrix of these entries (row, column, value); entries at the same place are summed in order.
-pub(crate) fn assembled<T: Real>(size: usize, mut entries: Vec<(usize, usize, T)>) -> Result<SparseColMat<usize, T>> {
-    entries.sort_by_key(|&(row, column, _)| (column, row));
-    let (mut pointers, mut rows, mut values) = (vec![0; size + 1], Vec::new(), Vec::<T>::new());
-    let mut last = None;
-    for (row, column, value) in entries {
-        match values.last_mut() {
-            Some(sum) if last == Some((row, column)) => *sum += value,
-            _ => {
-                rows.push(row);
-                values.push(value);
-                pointers[column + 1] += 1;
-            }
-        }
-        last = Some((row, column));
-    }
-    for column in 0..size {
-        pointers[column + 1] += pointers[column];
-    }
-    let pattern = SymbolicSparseColMatRef::new_checked(size, size, &pointers, None, &rows)
-        .to_owned()
-        .map_err(|_| Error::OutOfMemory { what: "the pattern of a matrix", bytes: None })?;
-    Ok(SparseColMat::new(pattern, values))
 }
 
 /// Rejects element matrices that do not fit their dofs, are not finite, or not symmetric.

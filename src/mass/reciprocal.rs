@@ -1,10 +1,11 @@
 //! Reciprocal mass matrices: a sparse M⁻¹ assembled from the elements.
 
-use super::assembly::{assembled, check_element};
+use super::assembly::check_element;
 use super::lump::check_positive;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::sparse::assembled;
 use faer::sparse::SparseColMat;
 
 /// A sparse inverse of the mass matrix, assembled directly: C = A⁻¹ (Σ_e L_eᵀ A_e M_e⁻¹ A_e L_e) A⁻¹ with the lumped

@@ -1,11 +1,12 @@
 //! Mass redistribution: moves the mass of contact dofs to others.
 
-use super::assembly::{assembled, check_dofs, flags};
+use super::assembly::{check_dofs, flags};
 use super::inverse::check_definite;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::sparse;
+use crate::sparse::assembled;
 use crate::sparse::check_vector;
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeMap;

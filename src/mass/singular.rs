@@ -1,9 +1,10 @@
 //! Singular mass matrices: assembled so that contact dofs have no mass.
 
-use super::assembly::{assembled, check_element, flags};
+use super::assembly::{check_element, flags};
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::sparse;
+use crate::sparse::assembled;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 use std::collections::BTreeMap;
 

@@ -2,9 +2,9 @@
 
 use super::body::ReducedBody;
 use crate::error::{Error, Result};
-use crate::mass::assembled;
 use crate::real::Real;
 use crate::sparse;
+use crate::sparse::assembled;
 use crate::system::LinearSystem;
 use faer::sparse::SparseColMatRef;
 use std::ops::Range;

@@ -4,9 +4,9 @@ use super::pencil;
 use crate::error::Result;
 use crate::kernels::dense::{add_product, transposed_product};
 use crate::kernels::vector::Accumulate;
-use crate::mass::assembled;
 use crate::memory;
 use crate::real::{Kernels, Real};
+use crate::sparse::assembled;
 use faer::sparse::{SparseColMat, SparseColMatRef};
 
 /// A dense symmetric matrix under construction.
