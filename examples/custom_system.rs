@@ -9,8 +9,8 @@
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{
-    EnergyMomentum, Error, Mass, Newton, NodesOnObstacle, PersistencyCorrection, Result, Simulation, StepControl,
-    System, TangentWeights, verify,
+    EnergyMomentum, Error, Mass, Newton, NodesOnObstacle, Result, Simulation, StepControl, System, TangentWeights,
+    verify,
 };
 
 /// Bars between point masses in the plane. Node i has the dofs 2i (x) and 2i + 1 (y).
@@ -169,7 +169,6 @@ fn main() -> Result<()> {
     let mut run = Simulation::builder(&mut truss, EnergyMomentum, h)
         .velocity(velocity)
         .constraint(NodesOnObstacle::new(floor, &nodes, &node_dofs, &(0..count).collect::<Vec<_>>())?)
-        .corrector(PersistencyCorrection::new())
         .newton(Newton::full().tolerances(1e-12, 1e-11)?)
         // Steps that fail are halved, and those in which a node that lands is uncertain by more than 1 mm.
         .step_control(StepControl::halving(h / 64.0)?.local_error(1e-3)?)

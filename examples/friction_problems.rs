@@ -8,8 +8,9 @@
 //! entries of W; a line `row column value` for each of these. Rows and columns count from 0, a contact has its normal
 //! row first.
 
-use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
+use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, GaussSeidel};
 use contact_dynamics::faer::MatRef;
+use contact_dynamics::{ActiveSet, ContactSolver};
 use contact_dynamics_scenes::boxes;
 use contact_dynamics_scenes::random::Congruential;
 use example_support::output::Output;

@@ -6,8 +6,7 @@ use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{
-    Composite, ContactLaw, LinearRows, LinearSystem, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
-    TimeIntegrator,
+    Composite, ContactLaw, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Simulation, TimeIntegrator,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
 use example_support::output::Output;
@@ -119,7 +118,6 @@ fn ball(contact: f64, across: usize, cells: [usize; 3]) -> Result<Ball, Box<dyn 
     let mut run = Simulation::builder(system, Composite, h)
         .velocity(solid.uniform([0.0, 0.0, -exact.velocity]))
         .constraint(NodesOnObstacle::new(plane, &solid.nodes, &solid.node_dofs(), &candidates)?)
-        .corrector(PersistencyCorrection::with_history_projection())
         .build()?;
     let start = run.energy().total();
     let (mut force, mut first, mut last) = (0.0_f64, f64::INFINITY, 0.0);

@@ -8,8 +8,8 @@
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
 use contact_dynamics::{
-    Automatic, Composite, ConjugateGradients, Error, Factorization, LinearSolver, LinearSystem, NodesOnObstacle,
-    PersistencyCorrection, Result, Simulation,
+    Automatic, ConjugateGradients, Error, Factorization, GeneralizedAlpha, LinearSolver, LinearSystem, NodesOnObstacle,
+    Result, Simulation,
 };
 use nalgebra_sparse::factorization::{CscCholesky, CscSymbolicCholesky};
 use nalgebra_sparse::na::DMatrixViewMut;
@@ -112,10 +112,9 @@ fn drop(cells: usize, solver: impl LinearSolver<f64> + 'static) -> Result<Simula
     let lower: Vec<_> = (0..places.len()).filter(|&i| places[i][2] == 0.0).collect();
     let floor = Plane::new([0.0, 0.0, -0.02], [0.2, 0.0, 1.0])?;
     // A step is about what a wave takes for a cell.
-    Simulation::builder(system, Composite, 0.1 / cells as f64)
+    Simulation::builder(system, GeneralizedAlpha::default(), 0.1 / cells as f64)
         .velocity([0.0, 0.0, -1.0].repeat(places.len()))
         .constraint(NodesOnObstacle::new(floor, &places, &dofs, &lower)?)
-        .corrector(PersistencyCorrection::with_history_projection())
         .linear_solver(solver)
         .build()
 }
@@ -166,7 +165,8 @@ fn main() -> Result<()> {
     }
 
     // What their solver refuses arrives with its own message.
-    let error = Simulation::builder(block(1, -1e9)?.0, Composite, 1.0).linear_solver(Theirs).build().err();
+    let error =
+        Simulation::builder(block(1, -1e9)?.0, GeneralizedAlpha::default(), 1.0).linear_solver(Theirs).build().err();
     let source = error.as_ref().and_then(std::error::Error::source).map(ToString::to_string);
     println!("\nA negative stiffness: {}", source.as_deref().unwrap_or("taken?"));
     assert!(matches!(error, Some(Error::Host { .. })));

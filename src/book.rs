@@ -15,6 +15,7 @@ pages! {
     Readme = "README.md";
     Start = "docs/start.md";
     Choosing = "docs/choosing.md";
+    Energies = "docs/energies.md";
     #[cfg(feature = "mesh-contact")]
     ContactObstacles = "docs/contact/obstacles.md";
     #[cfg(feature = "mesh-contact")]
@@ -90,6 +91,39 @@ mod tests {
             }
         }
         assert!(programs > 20);
+    }
+
+    /// Whoever reads a page in the package finds the files that it names there, or is told that they are in the
+    /// repository, as for the commands that need it.
+    #[test]
+    fn pages_say_which_files_and_commands_are_in_the_repository_alone() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap();
+        let is_packaged = |path: &str| {
+            let folder = path.starts_with("src/") || path.starts_with("docs/");
+            (folder || manifest.contains(&format!("    \"{path}\",\n"))) && root.join(path).exists()
+        };
+        let folders = ["src/", "docs/", "examples/", "tests/", "benches/", "bindings/", ".ci/"];
+        // A new project of the reader has its own src/main.rs.
+        let is_path = |word: &str| {
+            let is_inside = folders.iter().any(|folder| word.starts_with(folder));
+            is_inside && !word.contains([' ', '*']) && word != "src/main.rs"
+        };
+        let flags = ["--example", "--bench", "--test", "--workspace", " -p "];
+        let mut said = 0;
+        for (page, text) in pages() {
+            let visible: String = text.split("<!--").map(|part| part.rsplit("-->").next().unwrap_or("")).collect();
+            let words = visible.split_whitespace().collect::<Vec<_>>().join(" ");
+            let paths = words.split('`').skip(1).step_by(2).filter(|word| is_path(word) && !is_packaged(word));
+            let commands = visible.lines().filter(|line| {
+                line.contains("cargo ") && flags.iter().any(|flag| line.contains(flag)) && !line.contains("cargo add")
+            });
+            let needing: Vec<_> = paths.chain(commands).collect();
+            let says = ["in the repository", "In the repository", "In a checkout", "in a checkout"];
+            assert!(needing.is_empty() || says.iter().any(|say| words.contains(say)), "{page}: {needing:?}");
+            said += usize::from(!needing.is_empty());
+        }
+        assert!(said > 10);
     }
 
     /// Rustdoc would compile an unmarked block of these pages as Rust.

@@ -35,7 +35,8 @@ pub(crate) const MANY: usize = 256;
 /// A solver of [`ContactProblem`]s.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem};
+/// use contact_dynamics::{ActiveSet, ContactSolver};
 ///
 /// let mut solver: Box<dyn ContactSolver<f64>> = Box::new(ActiveSet::default());
 /// solver.reserve(2);

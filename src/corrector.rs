@@ -40,8 +40,8 @@ use crate::tableau::Tableau;
 /// Changes the result of a stage after its contact problem was solved; several act in the order given.
 ///
 /// ```
-/// use contact_dynamics::corrector::{Correction, Corrector};
-/// use contact_dynamics::{PersistencyCorrection, Result};
+/// use contact_dynamics::corrector::Correction;
+/// use contact_dynamics::{Corrector, PersistencyCorrection, Result};
 ///
 /// /// Velocity projection alone, written with the tools of a [`Correction`].
 /// #[derive(Debug)]

@@ -1,4 +1,21 @@
 //! Time integrators: how u, v and a are computed from the unknown of a step.
+//!
+//! The most used ones; `docs/schemes.md` has the measured comparison of all:
+//!
+//! | scheme | order | ρ∞ | solves a step | contact | take it for |
+//! | --- | --- | --- | --- | --- | --- |
+//! | [`GeneralizedAlpha::default()`](GeneralizedAlpha) | 2 | 0.8 | 1 | gap, with correction | the default |
+//! | [`Composite`] | 2 | 0 | 1 | gap, with correction | stiff modes gone in four steps, low ones kept by Ω⁵ |
+//! | [`Newmark::trapezoidal`] | 2 | 1 | 1 | gap, with correction | energy kept, nothing stiff |
+//! | [`Bathe`] | 2 | 0, or as given | 2 | gap, with correction | stiff modes gone in one step |
+//! | [`CentralDifference`] | 2 | explicit | 1 | gap of the next step | waves; exact at Courant number 1 in 1-D |
+//! | [`CdLagrange`] | 2 | explicit | 1 | gap rate | small steps, the smoothest raw contact force |
+//! | [`EnergyMomentum`] | 2 | 1 | 1 | gap, with correction | energy and angular momentum in large rotations |
+//! | [`MoreauJean`] | 2 (θ = ½) | 1 | 1 | gap rate | impacts as impulses, many contacts |
+//!
+//! The correction does most of the work at impact: corrected, the schemes of second order differ little. The step may
+//! change at any time ([`Simulation::set_step_size`](crate::Simulation::set_step_size)); every scheme keeps its order.
+//! [`analysis::report`](crate::analysis::report) prints the properties of a scheme, also of a user's own.
 
 mod bathe;
 mod bdf2;

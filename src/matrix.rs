@@ -150,7 +150,7 @@ mod tests {
         let expected = vec![vec![1.0, 2.0, 0.0], vec![3.0, 4.0, 0.0], vec![0.0, 5.0, 6.0]];
         assert_eq!(dense(&from_csr(&indptr, &indices, &data, Stored::All).unwrap()), expected);
         let transposed = dense(&from_csc(&indptr, &indices, &data, Stored::All).unwrap());
-        assert!((0..3).all(|i| (0..3).all(|j| transposed[i][j] == expected[j][i])));
+        assert_eq!(transposed, [[1.0, 3.0, 0.0], [2.0, 4.0, 5.0], [0.0, 0.0, 6.0]]);
         // The same lower triangle by rows, and by columns that hold the upper one.
         let (indptr, indices, data) = ([0_usize, 1, 3, 5], [0, 0, 1, 1, 2], [1.0, 2.0, 4.0, 5.0, 6.0]);
         let symmetric = vec![vec![1.0, 2.0, 0.0], vec![2.0, 4.0, 5.0], vec![0.0, 5.0, 6.0]];

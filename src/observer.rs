@@ -35,11 +35,11 @@ impl<'a, T> StepView<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::observer::{EnergyRecorder, Observer};
-    /// use contact_dynamics::{LinearSystem, Newmark, Simulation, StepView};
+    /// use contact_dynamics::observer::EnergyRecorder;
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Observer, Simulation, StepView};
     ///
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 4.0)])?;
-    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1)
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, GeneralizedAlpha::default(), 0.1)
     ///     .displacement(vec![1.0])
     ///     .build()?;
     /// let mut recorder = EnergyRecorder::new();
@@ -71,8 +71,8 @@ impl<'a, T> StepView<'a, T> {
 /// A combination of observers computes everything that any of them [wants](Self::wants).
 ///
 /// ```
-/// use contact_dynamics::observer::{Control, DofRecorder, Observer, StepView, Wants};
-/// use contact_dynamics::{Error, Result};
+/// use contact_dynamics::observer::{DofRecorder, Wants};
+/// use contact_dynamics::{Control, Error, Observer, Result, StepView};
 ///
 /// /// Writes the energy to a file.
 /// struct Journal(std::io::BufWriter<Vec<u8>>);

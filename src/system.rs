@@ -45,7 +45,7 @@ pub enum Linearity {
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
-/// use contact_dynamics::{Mass, Newmark, Result, Simulation, System, TangentWeights, verify};
+/// use contact_dynamics::{GeneralizedAlpha, Mass, Result, Simulation, System, TangentWeights, verify};
 ///
 /// /// A mass of 2 on a spring that pulls with 2 u³.
 /// struct Cubic(SymbolicSparseColMat<usize>);
@@ -74,7 +74,7 @@ pub enum Linearity {
 /// assert!(verify::tangent(&mut spring, 0.0, &[0.7], &[1.0], 1e-5, 1e-5)?.largest() < 1e-8);
 ///
 /// // Released at u = 1 it passes through zero at t = 1.8540747 with the speed √½.
-/// let mut run = Simulation::builder(&mut spring, Newmark::trapezoidal(), 1.854_074_677 / 1000.0)
+/// let mut run = Simulation::builder(&mut spring, GeneralizedAlpha::default(), 1.854_074_677 / 1000.0)
 ///     .displacement(vec![1.0])
 ///     .build()?;
 /// run.run_until(1.854, &mut ())?;

@@ -21,8 +21,7 @@ const STEPS: usize = 10;
 /// Dyn. 6, 1978). An exact scheme has 1 and 1.
 ///
 /// ```
-/// use contact_dynamics::tableau::StartUp;
-/// use contact_dynamics::{Composite, TimeIntegrator, analysis};
+/// use contact_dynamics::{Composite, StartUp, TimeIntegrator, analysis};
 /// // The Taylor past of a stiff mode starts with the velocity −Ω/4 ω u₀ …
 /// let ghost = analysis::overshoot(&Composite.tableau(), 1e3, StartUp::Taylor);
 /// assert!((ghost.velocity / 250.0 - 1.0).abs() < 0.01);
@@ -39,8 +38,7 @@ pub fn overshoot(tableau: &Tableau, omega: f64, start: StartUp) -> Overshoot {
 /// Exponents of the growth of displacement and velocity overshoot for Ω → ∞ (0: bounded).
 ///
 /// ```
-/// use contact_dynamics::tableau::StartUp;
-/// use contact_dynamics::{Newmark, TimeIntegrator, analysis};
+/// use contact_dynamics::{Newmark, StartUp, TimeIntegrator, analysis};
 /// let growth = analysis::overshoot_growth(&Newmark::new(0.3025, 0.6)?.tableau(), StartUp::Trapezoidal);
 /// assert_eq!(growth.map(f64::round), [0.0, 1.0]); // velocity proportional to Ω
 /// # Ok::<(), contact_dynamics::Error>(())

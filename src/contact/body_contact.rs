@@ -37,7 +37,7 @@ use crate::real::Real;
 /// ```
 /// use contact_dynamics::contact::BodyContact;
 /// use contact_dynamics::faer::sparse::SparseColMat;
-/// use contact_dynamics::{Composite, LinearSystem, Simulation};
+/// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Simulation};
 ///
 /// // A square of nodes on its corner, 0.1 above a square with sides along the axes; bodies on the left of the way.
 /// let coordinates = [
@@ -57,7 +57,7 @@ use crate::real::Real;
 /// }
 /// let mut velocity = vec![0.0; 16];
 /// velocity[9] = -1.0;
-/// let mut run = Simulation::builder(system, Composite, 0.01)
+/// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.01)
 ///     .velocity(velocity)
 ///     .constraints(contact.constraints()?)
 ///     .build()?;

@@ -16,9 +16,9 @@ use crate::real::Real;
 /// The end of a bar against a moving wall (13 lines):
 ///
 /// ```
-/// use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts};
+/// use contact_dynamics::contact::Contacts;
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{Composite, LinearSystem, Result, Simulation};
+/// use contact_dynamics::{ContactConstraint, ContactLaw, GeneralizedAlpha, LinearSystem, Result, Simulation};
 ///
 /// struct Wall;
 ///
@@ -38,7 +38,10 @@ use crate::real::Real;
 /// let entries = [(0, 0, 1e3), (0, 1, -1e3), (1, 0, -1e3), (1, 1, 1e3)];
 /// let k: Vec<_> = entries.iter().map(|&(i, j, k)| Triplet::new(i, j, k)).collect();
 /// let bar = LinearSystem::lumped(vec![1.0, 1.0], SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &k)?)?;
-/// let mut run = Simulation::builder(bar, Composite, 1e-3).velocity(vec![1.0, 1.0]).constraint(Wall).build()?;
+/// let mut run = Simulation::builder(bar, GeneralizedAlpha::default(), 1e-3)
+///     .velocity(vec![1.0, 1.0])
+///     .constraint(Wall)
+///     .build()?;
 /// run.run_until(0.08, &mut ())?;
 /// assert!(run.state().contacts().closed()[0] && (run.state().velocity()[1] + 0.5).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -47,8 +50,8 @@ use crate::real::Real;
 /// A point on or above the parabola y = x² (18 lines):
 ///
 /// ```
-/// use contact_dynamics::contact::{Candidates, ContactConstraint, ContactLaw, Contacts};
-/// use contact_dynamics::{Result, verify};
+/// use contact_dynamics::contact::{Candidates, Contacts};
+/// use contact_dynamics::{ContactConstraint, ContactLaw, Result, verify};
 ///
 /// struct Parabola {
 ///     x: f64, // where its tangent is taken
@@ -184,7 +187,8 @@ pub trait ContactConstraint<T: Real>: Send {
     /// is no bond.
     ///
     /// ```
-    /// use contact_dynamics::contact::{BondStrength, ContactConstraint, LinearRows};
+    /// use contact_dynamics::contact::BondStrength;
+    /// use contact_dynamics::{ContactConstraint, LinearRows};
     ///
     /// // Two dofs that hold together up to a pull of 3.
     /// let bonded = LinearRows::new().bond(3.0, &[(0, -1.0), (1, 1.0)], 0.0);

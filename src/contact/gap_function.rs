@@ -46,7 +46,8 @@ struct Row<'a, T> {
 /// [`fallible`](Self::fallible). Rows are identified by their order: (row, 0).
 ///
 /// ```
-/// use contact_dynamics::contact::{ContactConstraint, GapFunction};
+/// use contact_dynamics::contact::GapFunction;
+/// use contact_dynamics::ContactConstraint;
 ///
 /// // The end of a rod (dofs 6 and 7, at (0, 1) in the beginning) stays above the parabola y = x²/4.
 /// let parabola = |_: f64, x: &[f64], v: &[f64], gradient: &mut [f64]| {

@@ -14,7 +14,7 @@ use crate::real::Real;
 /// Parameters are `f64` in every run, in the units of the host: force/length for a stiffness.
 ///
 /// ```
-/// use contact_dynamics::contact::ContactLaw;
+/// use contact_dynamics::ContactLaw;
 /// // Two glass spheres of radius 0.01, E = 48 GPa, ν = 0.2.
 /// let law = ContactLaw::hertz(48e9 / (2.0 * (1.0 - 0.04)), 0.005);
 /// assert!(matches!(law, ContactLaw::PowerLaw { exponent: 1.5, .. }) && law.is_compliant());
@@ -34,14 +34,13 @@ pub enum ContactLaw {
     /// not accept it.
     ///
     /// ```
-    /// use contact_dynamics::contact::ContactLaw;
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{ContactLaw, GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
     /// let ball = LinearSystem::lumped(vec![1.0], free)?.load(|_, f| f[0] = -9.81);
     /// let floor = LinearRows::new().row(ContactLaw::Restitution { coefficient: 0.5 }, &[(0, 1.0)], 1.0);
-    /// let mut run = Simulation::builder(ball, Newmark::trapezoidal(), 0.01).constraint(floor).build()?;
+    /// let mut run = Simulation::builder(ball, GeneralizedAlpha::default(), 0.01).constraint(floor).build()?;
     /// run.run_until(0.6, &mut ())?;
     /// let (u, v) = (run.state().displacement()[0] + 1.0, run.state().velocity()[0]);
     /// assert!((9.81 * u + 0.5 * v * v - 0.25 * 9.81).abs() < 1e-12); // e² of the height
@@ -67,9 +66,8 @@ pub enum ContactLaw {
     ///   work; its remainder cancels it.
     ///
     /// ```
-    /// use contact_dynamics::contact::ContactLaw;
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Gssss, LinearRows, LinearSystem, Simulation};
+    /// use contact_dynamics::{ContactLaw, Gssss, LinearRows, LinearSystem, Simulation};
     ///
     /// // A ball flies with speed 2 at a wall 0.99 away, 0.02 a step.
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
@@ -125,13 +123,12 @@ pub enum ContactLaw {
     ///   [`Works::damping`](crate::Works::damping) has the rest of the work of contact forces.
     ///
     /// ```
-    /// use contact_dynamics::contact::ContactLaw;
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{ContactLaw, GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
     /// let law = ContactLaw::KelvinVoigt { stiffness: 100.0, damping: 5.0 };
-    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Newmark::trapezoidal(), 1e-4)
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, GeneralizedAlpha::default(), 1e-4)
     ///     .velocity(vec![-5.0])
     ///     .constraint(LinearRows::new().row(law, &[(0, 1.0)], 0.1))
     ///     .build()?;
@@ -153,7 +150,7 @@ pub enum ContactLaw {
     /// and p: e = w/v is 1 − ⅔ χ v + … for small χ v. Works are booked as for [`KelvinVoigt`](Self::KelvinVoigt).
     ///
     /// ```
-    /// use contact_dynamics::contact::ContactLaw;
+    /// use contact_dynamics::ContactLaw;
     /// let law = ContactLaw::HuntCrossley { stiffness: 1e5, exponent: 1.5, dissipation: 0.2 };
     /// assert!(law.is_compliant());
     /// ```

@@ -153,18 +153,18 @@ impl<'a, T: Real> LinearRows<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// // A mass that is glued to a wall is pulled with a force that grows by 10 a second.
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
     /// let mass = LinearSystem::lumped(vec![1.0], free)?.load(|t, f| f[0] = 10.0 * t);
-    /// let mut run = Simulation::builder(mass, Newmark::trapezoidal(), 0.01)
+    /// let mut run = Simulation::builder(mass, GeneralizedAlpha::default(), 0.01)
     ///     .constraint(LinearRows::new().bond(4.999, &[(0, 1.0)], 0.0))
     ///     .build()?;
     /// run.run_until(1.0, &mut ())?;
     /// let broken = run.state().broken_bonds()[0];
-    /// assert!((broken.time - 0.5).abs() < 1e-12 && broken.load >= 1.0);
-    /// assert!(run.state().velocity()[0] > 3.7); // 5 (1 − 0.5²)
+    /// assert!((broken.time - 0.5).abs() < 0.011 && broken.load >= 1.0);
+    /// assert!(run.state().velocity()[0] > 3.69); // 5 (1 − 0.5²), less a step
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -185,7 +185,7 @@ impl<'a, T: Real> LinearRows<'a, T> {
     /// [`Error::Parameter`] if the normal is zero, [`Error::NotFinite`].
     ///
     /// ```
-    /// use contact_dynamics::contact::{ContactConstraint, ContactLaw, LinearRows};
+    /// use contact_dynamics::{ContactConstraint, ContactLaw, LinearRows};
     /// let (lower, upper) = ([0, 1], [2, 3]); // x and y dofs
     /// let mut contact = LinearRows::new().pair(ContactLaw::Rigid, lower, upper, [3.0, 4.0], 0.1)?;
     /// let mut gap = [0.0_f64];
@@ -239,14 +239,14 @@ impl<'a, T: Real> LinearRows<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// // A block of mass 2 on a floor (dofs x, y), thrown along it with speed 1; g = 10, μ = 0.25.
     /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
     /// let block = LinearSystem::lumped(vec![2.0; 2], free)?.load(|_, f| f[1] = -20.0);
     /// let floor = LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.25, &[&[(0, 1.0)]]);
-    /// let mut run = Simulation::builder(block, Newmark::trapezoidal(), 0.01)
+    /// let mut run = Simulation::builder(block, GeneralizedAlpha::default(), 0.01)
     ///     .velocity(vec![1.0, 0.0])
     ///     .constraint(floor)
     ///     .build()?;

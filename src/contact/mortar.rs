@@ -221,7 +221,8 @@ impl<T: Real> Mortar<T> {
     /// ordinary contact. Nodes that touch later are not bonded.
     ///
     /// ```
-    /// use contact_dynamics::contact::{BondStrength, ContactConstraint, ContactLaw, Contacts, Mortar};
+    /// use contact_dynamics::contact::{BondStrength, Contacts, Mortar};
+    /// use contact_dynamics::{ContactConstraint, ContactLaw};
     ///
     /// // Two segments upon each other, of length 2; each node has half of it.
     /// let coordinates = [[2.0, 0.0], [0.0, 0.0], [0.0, 0.0], [2.0, 0.0]];
@@ -302,7 +303,8 @@ impl<T: Real> Mortar<T> {
     /// larger radius of curvature the master.
     ///
     /// ```
-    /// use contact_dynamics::contact::{ContactConstraint, Contacts, Mortar};
+    /// use contact_dynamics::contact::{Contacts, Mortar};
+    /// use contact_dynamics::ContactConstraint;
     ///
     /// // Two segments upon one.
     /// let coordinates = [[2.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.75, 0.0], [2.0, 0.0]];

@@ -59,7 +59,8 @@ type Drag<'a, T, const D: usize> = Box<dyn FnMut(f64, [T; D]) -> [[T; D]; 2] + S
 /// within a step is not detected.
 ///
 /// ```
-/// use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Plane};
+/// use contact_dynamics::contact::Plane;
+/// use contact_dynamics::{ContactConstraint, ContactLaw, NodesOnObstacle};
 ///
 /// let (coordinates, dofs) = ([[1.0, 0.0], [0.0, 0.5]], [[0, 1], [2, 3]]);
 /// let slope = Plane::new([0.0, 0.0], [0.6, 0.8])?;
@@ -181,9 +182,9 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// along it ([`dragging`](Self::dragging)).
     ///
     /// ```
-    /// use contact_dynamics::contact::{NodesOnObstacle, Plane};
+    /// use contact_dynamics::contact::Plane;
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, NodesOnObstacle, Simulation};
     ///
     /// // A particle is laid on a belt that runs with speed 1 to the right; g = 10, μ = 0.2.
     /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
@@ -192,7 +193,7 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// let belt = NodesOnObstacle::new(Plane::new([0.0; 2], [0.0, 1.0])?, &[[0.0; 2]], &[[0, 1]], &[0])?
     ///     .friction(0.2)
     ///     .dragging(|_, _| [[1.0, 0.0], [0.0; 2]]);
-    /// let mut run = Simulation::builder(particle, Newmark::trapezoidal(), 0.01).constraint(belt).build()?;
+    /// let mut run = Simulation::builder(particle, GeneralizedAlpha::default(), 0.01).constraint(belt).build()?;
     /// run.run_until(0.3, &mut ())?;
     /// assert!((run.state().velocity()[0] - 0.6).abs() < 1e-12); // μ g t
     /// run.run_until(1.0, &mut ())?;
@@ -285,9 +286,9 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// closure that does not return a rotation causes [`Error::Parameter`] or [`Error::NotFinite`].
     ///
     /// ```
-    /// use contact_dynamics::contact::{NodesOnObstacle, Plane, RigidMotion};
+    /// use contact_dynamics::contact::{Plane, RigidMotion};
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearSystem, Newmark, PersistencyCorrection, Simulation};
+    /// use contact_dynamics::{LinearSystem, Newmark, NodesOnObstacle, Simulation};
     ///
     /// // A tube that turns about the origin with ω = 2 flings out what is in it: r = r₀ cosh ω t, and presses on it
     /// // with 2 m ω ṙ.
@@ -298,7 +299,6 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
     /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0; 2], free)?, Newmark::trapezoidal(), 1e-3)
     ///     .velocity(vec![0.0, 2.0])
     ///     .constraint(tube)
-    ///     .corrector(PersistencyCorrection::with_history_projection())
     ///     .build()?;
     /// run.run_until(1.0, &mut ())?;
     /// let u = run.state().displacement();

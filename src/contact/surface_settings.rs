@@ -14,8 +14,8 @@ use crate::real::Real;
 /// friction have their own short methods there too, `with_law` and `friction`.
 ///
 /// ```
-/// use contact_dynamics::ContactConstraint;
-/// use contact_dynamics::contact::{ContactLaw, Contacts, NodeToFacet, SurfaceSettings};
+/// use contact_dynamics::contact::{Contacts, NodeToFacet, SurfaceSettings};
+/// use contact_dynamics::{ContactConstraint, ContactLaw};
 ///
 /// // The middle surfaces of two sheets, 0.1 apart, of which each is 0.06 thick.
 /// let coordinates = [[1.0, 0.0], [0.0, 0.0], [0.0, 0.1], [1.0, 0.1]];

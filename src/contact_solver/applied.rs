@@ -32,7 +32,8 @@ impl<'a, T: Real> AppliedProblem<'a, T> {
     /// data of the rows.
     ///
     /// ```
-    /// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, AppliedProblem, ContactSolver};
+    /// use contact_dynamics::contact_solver::{AdmissibleSet, AppliedProblem};
+    /// use contact_dynamics::{ActiveSet, ContactSolver};
     ///
     /// let mut product = |x: &[f64], y: &mut [f64]| {
     ///     (y[0], y[1]) = (2.0 * x[0] + x[1], x[0] + 2.0 * x[1]);

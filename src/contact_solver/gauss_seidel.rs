@@ -38,7 +38,8 @@ use crate::real::Real;
 /// less accurate. A problem without a solution uses all allowed sweeps before it fails.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, GaussSeidel};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, GaussSeidel};
+/// use contact_dynamics::ContactSolver;
 ///
 /// // The same contact twice: which of the two carries is arbitrary, their sum is not.
 /// let sets = [AdmissibleSet::NonNegative; 2];

@@ -37,7 +37,8 @@ use crate::rounding::{rounding, share_of_rounding};
 /// and limited); a row that is independent only by rounding counts as dependent.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, Pivoting};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, Pivoting};
+/// use contact_dynamics::ContactSolver;
 ///
 /// // The same contact twice, and one that it repels.
 /// let w = [1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 2.0];

@@ -196,7 +196,8 @@ impl From<ContactLaw> for AdmissibleSet {
 /// a gap: a residual compares y_i with W_ii λ_i, never meters with newtons.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem};
+/// use contact_dynamics::{ActiveSet, ContactSolver};
 ///
 /// let sets = [AdmissibleSet::NonNegative; 2];
 /// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &sets, &[1e-14; 2])?;

@@ -28,7 +28,8 @@ use crate::real::Real;
 /// to large ones are less accurate. A problem without a solution uses all allowed iterations before it fails.
 ///
 /// ```
-/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ContactSolver, ProjectedGradient};
+/// use contact_dynamics::contact_solver::{AdmissibleSet, ContactProblem, ProjectedGradient};
+/// use contact_dynamics::ContactSolver;
 ///
 /// let sets = [AdmissibleSet::NonNegative; 2];
 /// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-4.0, -5.0], &sets, &[1e-15; 2]).unwrap();

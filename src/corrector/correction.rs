@@ -35,8 +35,8 @@ use crate::system::System;
 /// ([`move_past`](Self::move_past), [`project_past`](Self::project_past)).
 ///
 /// ```
-/// use contact_dynamics::corrector::{Correction, Corrector};
-/// use contact_dynamics::{PersistencyCorrection, Result};
+/// use contact_dynamics::corrector::Correction;
+/// use contact_dynamics::{Corrector, PersistencyCorrection, Result};
 ///
 /// /// Gives back a share of the energy that an impact took, as soon as the contact is open.
 /// #[derive(Debug)]

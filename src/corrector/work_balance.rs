@@ -56,8 +56,8 @@ use crate::tableau::Tableau;
 /// no mass, and of the presets `conservative()` and `explicit()`.
 ///
 /// ```
-/// use contact_dynamics::corrector::{Corrector, WorkBalance};
-/// use contact_dynamics::{GeneralizedAlpha, Newmark, TimeIntegrator};
+/// use contact_dynamics::corrector::WorkBalance;
+/// use contact_dynamics::{Corrector, GeneralizedAlpha, Newmark, TimeIntegrator};
 ///
 /// let balance: &dyn Corrector<f64> = &WorkBalance;
 /// assert!(balance.requirements(&Newmark::trapezoidal().tableau()).scheme.is_ok());

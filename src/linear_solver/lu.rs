@@ -34,7 +34,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{LinearSystem, Lu, Newmark, Simulation};
+/// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Lu, Simulation};
 ///
 /// let matrix = |entries: &[(usize, usize, f64)]| {
 ///     let entries: Vec<_> = entries.iter().map(|&(i, j, x)| Triplet::new(i, j, x)).collect();
@@ -47,7 +47,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 ///
 /// // Its circular whirls have ω² − 15 ω = 100: the forward one turns with 20, the backward one with −5.
 /// let period = 2.0 * std::f64::consts::PI / 20.0;
-/// let mut run = Simulation::builder(rotor, Newmark::trapezoidal(), period / 1000.0)
+/// let mut run = Simulation::builder(rotor, GeneralizedAlpha::default(), period / 1000.0)
 ///     .linear_solver(Lu)
 ///     .displacement(vec![1.0, 0.0])
 ///     .velocity(vec![0.0, 20.0])

@@ -35,14 +35,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{Composite, LinearRows, LinearSystem, PersistencyCorrection, Simulation};
+/// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
 ///
 /// // A ball of unit mass flies with speed 2 toward a wall 1 away.
 /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
-/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Composite, 0.01)
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, GeneralizedAlpha::default(), 0.01)
 ///     .velocity(vec![-2.0])
 ///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.0))
-///     .corrector(PersistencyCorrection::with_history_projection())
 ///     .build()?;
 /// run.run_until(1.0, &mut ())?;
 /// // A rigid ball loses its velocity: contact without a rebound law is plastic.
@@ -158,10 +157,11 @@ impl<T: Real> Simulation<'_, T> {
     /// and for stages that are linear in their unknown.
     ///
     /// ```
-    /// # use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// # use contact_dynamics::{GeneralizedAlpha, LinearSystem, Simulation};
     /// # use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
     /// # let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
-    /// # let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.1).build()?;
+    /// # let system = LinearSystem::lumped(vec![1.0], k)?;
+    /// # let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.1).build()?;
     /// run.step()?;
     /// for iteration in run.convergence() {
     ///     println!("{:.1e} {:.1e}", iteration.residual, iteration.increment);
@@ -205,14 +205,17 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Composite, LinearRows, LinearSystem, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// // Two free masses, of which the first runs into the second with speed 2.
     /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
     /// let system = LinearSystem::lumped(vec![1.0; 2], free)?;
     /// let gap = LinearRows::new().unilateral(&[(0, -1.0), (1, 1.0)], 0.05);
-    /// let mut run = Simulation::builder(system, Composite, 0.1).velocity(vec![2.0, 0.0]).constraint(gap).build()?;
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.1)
+    ///     .velocity(vec![2.0, 0.0])
+    ///     .constraint(gap)
+    ///     .build()?;
     /// run.step()?;
     /// let [first, second] = run.impulses_on_dofs() else { panic!("two dofs") };
     /// assert!((first + 1.0).abs() < 1e-12 && (second - 1.0).abs() < 1e-12);

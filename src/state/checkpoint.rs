@@ -16,14 +16,15 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{Checkpoint, Composite, LinearRows, LinearSystem, Simulation};
+/// use contact_dynamics::{Checkpoint, GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
 ///
 /// // A mass on a spring, which pulls it against a stop.
 /// let scene = || {
 ///     let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 9.0)])?;
 ///     let stop = LinearRows::new().unilateral(&[(0, 1.0)], 0.5);
 ///     Ok::<_, Box<dyn std::error::Error>>(
-///         Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Composite, 0.01).constraint(stop),
+///         Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, GeneralizedAlpha::default(), 0.01)
+///             .constraint(stop),
 ///     )
 /// };
 /// let mut run = scene()?.displacement(vec![1.0]).build()?;

@@ -10,11 +10,11 @@ impl<T: Real> Checkpoint<T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Checkpoint, Composite, LinearSystem, Simulation};
+    /// use contact_dynamics::{Checkpoint, GeneralizedAlpha, LinearSystem, Simulation};
     ///
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[Triplet::new(0, 0, 9.0)])?;
     /// let system = LinearSystem::lumped(vec![1.0; 2], k)?;
-    /// let mut run = Simulation::builder(system, Composite, 0.01).velocity(vec![1.0, 2.0]).build()?;
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.01).velocity(vec![1.0, 2.0]).build()?;
     /// run.run_until(0.1, &mut ())?;
     /// let whole = run.checkpoint();
     /// let parts = [(whole.part(&[1])?, vec![1]), (whole.part(&[0])?, vec![0])];

@@ -43,7 +43,7 @@ impl<'a, T> Path<'a, T> {
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
-/// use contact_dynamics::{DampingForce, Mass, Newmark, Result, Simulation, System, TangentWeights, verify};
+/// use contact_dynamics::{DampingForce, GeneralizedAlpha, Mass, Result, Simulation, System, TangentWeights, verify};
 ///
 /// /// A mass of 2 on a spring and a dashpot that resists with v + v³.
 /// struct Dashpot(SymbolicSparseColMat<usize>);
@@ -84,7 +84,7 @@ impl<'a, T> Path<'a, T> {
 ///
 /// let mut system = Dashpot(SymbolicSparseColMat::new_checked(1, 1, vec![0, 1], None, vec![0]));
 /// assert!(verify::tangent(&mut system, 0.0, &[0.7], &[1.0], 1e-5, 1e-5)?.largest() < 1e-8);
-/// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1e-3)
+/// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 1e-3)
 ///     .velocity(vec![1.0])
 ///     .energy_balance()
 ///     .build()?;

@@ -204,7 +204,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Error, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{Error, GeneralizedAlpha, LinearSystem, Simulation};
     ///
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
     /// let recorded = [0.0, 1.0, 4.0]; // the load at t = 0, 1, 2
@@ -213,7 +213,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     ///     force[0] = *known.ok_or(Error::Host { callback: "load", source: "nothing recorded".into() })?;
     ///     Ok(())
     /// });
-    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 1.0).build()?;
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 1.0).build()?;
     /// run.run_until(2.0, &mut ())?;
     /// assert!(matches!(run.step(), Err(Error::Host { callback: "load", .. })));
     /// assert_eq!(run.time(), 2.0);

@@ -49,8 +49,8 @@ pub struct GapJacobianError {
 /// The errors of the constraint, and [`Error::MissingContactDof`] for dofs that u and v do not have.
 ///
 /// ```
-/// use contact_dynamics::contact::{NodesOnObstacle, Side, Sphere};
-/// use contact_dynamics::verify;
+/// use contact_dynamics::contact::{Side, Sphere};
+/// use contact_dynamics::{NodesOnObstacle, verify};
 ///
 /// let ball = Sphere::new([0.0, 0.0, 0.0], 1.0, Side::Outside)?;
 /// let mut contact = NodesOnObstacle::new(ball, &[[0.8, 0.5, 0.7]], &[[0, 1, 2]], &[0])?

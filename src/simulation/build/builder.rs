@@ -215,8 +215,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::tableau::StartUp;
-    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    /// use contact_dynamics::{Composite, LinearSystem, Simulation, StartUp};
     ///
     /// // A stiff spring that is released out of equilibrium.
     /// let run = |start_up| {
@@ -265,15 +264,14 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{InitialOverclosure, LinearRows, LinearSystem, Newmark, PersistencyCorrection};
+    /// use contact_dynamics::{GeneralizedAlpha, InitialOverclosure, LinearRows, LinearSystem};
     /// use contact_dynamics::Simulation;
     ///
     /// // A mass on a spring at rest, 1e-3 deep in a wall.
     /// let start = |overclosure| {
     ///     let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 9.0)])?;
-    ///     let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.01)
+    ///     let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, GeneralizedAlpha::default(), 0.01)
     ///         .constraint(LinearRows::new().unilateral(&[(0, 1.0)], -1e-3))
-    ///         .corrector(PersistencyCorrection::new())
     ///         .initial_overclosure(overclosure)
     ///         .build()?;
     ///     run.run_until(1.0, &mut ())?;
@@ -311,13 +309,13 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearRows, LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// // Two masses on springs (k = 4, 1) in a row with a wall 0.1 behind the second one, the first pulled by 1.
     /// let entries = [(0, 0, 5.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)].map(|(i, j, k)| Triplet::new(i, j, k));
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &entries)?;
     /// let system = LinearSystem::lumped(vec![1.0; 2], k)?.load(|_, f| f[0] += 1.0);
-    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.01)
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.01)
     ///     .constraint(LinearRows::new().unilateral(&[(1, -1.0)], 0.1))
     ///     .start_at_rest()
     ///     .build()?;

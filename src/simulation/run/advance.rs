@@ -71,10 +71,10 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Simulation};
     ///
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
-    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Newmark::trapezoidal(), 0.03)
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, GeneralizedAlpha::default(), 0.03)
     ///     .displacement(vec![1.0])
     ///     .build()?;
     /// run.land_on(1.0, &mut ())?;

@@ -52,15 +52,15 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::contact::{NodesOnObstacle, Plane};
-    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    /// use contact_dynamics::contact::Plane;
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, NodesOnObstacle, Simulation};
     ///
     /// // A particle of weight 10 rests on a floor, 3 to the right of the origin.
     /// let none = [Triplet::new(0, 0, 0.0), Triplet::new(1, 1, 0.0)];
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &none)?;
     /// let system = LinearSystem::lumped(vec![1.0; 2], free)?.load(|_, f| f[1] = -10.0);
     /// let floor = NodesOnObstacle::new(Plane::new([0.0, 0.0], [0.0, 1.0])?, &[[3.0, 0.0]], &[[0, 1]], &[0])?;
-    /// let mut run = Simulation::builder(system, Composite, 0.1).constraint(floor).build()?;
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.1).constraint(floor).build()?;
     /// run.step()?;
     /// let contact = run.contact_forces().next().ok_or("no contact")?;
     /// let [(dof, force)] = contact.forces().collect::<Vec<_>>()[..] else { panic!("one dof") };

@@ -27,14 +27,13 @@ use crate::state::{Motion, State};
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-/// use contact_dynamics::{LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation, StepControl};
+/// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation, StepControl};
 ///
 /// // A mass flies at a wall; far from it large steps will do.
 /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
-/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, Newmark::trapezoidal(), 0.1)
+/// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], free)?, GeneralizedAlpha::default(), 0.1)
 ///     .velocity(vec![-1.0])
 ///     .constraint(LinearRows::new().unilateral(&[(0, 1.0)], 1.03))
-///     .corrector(PersistencyCorrection::new())
 ///     .step_control(StepControl::halving(1e-4)?.local_error(1e-3)?)
 ///     .build()?;
 /// let mut smallest = 0.1_f64;

@@ -49,10 +49,10 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{Composite, LinearSystem, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Simulation};
     ///
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 1.0)])?;
-    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, Composite, 0.01)
+    /// let mut run = Simulation::builder(LinearSystem::lumped(vec![1.0], k)?, GeneralizedAlpha::default(), 0.01)
     ///     .displacement(vec![1.0])
     ///     .build()?;
     /// run.run_until(1.0, &mut ())?;

@@ -15,12 +15,12 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// ```
     /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-    /// use contact_dynamics::{LinearSystem, Newmark, Simulation};
+    /// use contact_dynamics::{GeneralizedAlpha, LinearSystem, Simulation};
     ///
     /// // A mass under a force that is switched on at t = 1.
     /// let k = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 0.0)])?;
     /// let system = LinearSystem::lumped(vec![1.0], k)?.load(|t, f| f[0] = if t < 1.0 - 1e-9 { 0.0 } else { 3.0 });
-    /// let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.1).build()?;
+    /// let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 0.1).build()?;
     /// run.land_on(1.0 - 1e-8, &mut ())?; // before the jump
     /// run.land_on(1.0, &mut ())?; // over it
     /// run.restart()?; // and begin again behind it

@@ -140,7 +140,7 @@ impl Recipe {
         self.rows.iter().fold(LinearRows::new(), |rows, row| {
             let Row { gap, amplitude, frequency, .. } = *row;
             let offset: GapOffset<'static, T> = if amplitude == 0.0 {
-                T::of(gap * length).into()
+                GapOffset::from(T::of(gap * length))
             } else {
                 GapOffset::moving(move |t| {
                     let [way, rate, acceleration] = swing(amplitude * length, frequency / time, t);
