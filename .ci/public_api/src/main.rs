@@ -14,8 +14,20 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     }
     let builder = public_api::Builder::from_rustdoc_json(path);
     let api = builder.omit_blanket_impls(true).omit_auto_trait_impls(true).omit_auto_derived_impls(true).build()?;
-    for item in api.items() {
-        println!("{item}");
+    // Of the prelude only names: their items are listed where they belong.
+    let mut is_prelude = false;
+    for line in api.items().map(ToString::to_string) {
+        let own = line.split_once("contact_dynamics::prelude").map(|(_, name)| name);
+        if line.starts_with("pub mod ") {
+            is_prelude = own.is_some();
+        }
+        let is_name = own.is_some_and(|path| {
+            let name = path.trim_start_matches("::");
+            !name.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').starts_with("::")
+        });
+        if !is_prelude || is_name {
+            println!("{line}");
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

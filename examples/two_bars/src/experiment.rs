@@ -2,8 +2,8 @@
 
 use contact_dynamics::reference::{CollidingBars, Side};
 use contact_dynamics::{Composite, Newmark, PersistencyCorrection, Result, Simulation, TimeIntegrator};
-use contact_dynamics_scenes::Bars;
-use contact_dynamics_scenes::measure::{Figures, Record, figures, record_run};
+use contact_dynamics_bars::Bars;
+use contact_dynamics_bars::measure::{Figures, Record, figures, record_run};
 use std::time::Instant;
 
 /// End of every run; the bars touch from 0.1 s to 0.3 s.

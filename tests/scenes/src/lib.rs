@@ -1,6 +1,5 @@
 //! Meshes, assembly and measured quantities shared by tests, benches and examples. Not published.
 
-pub mod bars;
 pub mod bed;
 pub mod boxes;
 pub mod combinations;
@@ -20,8 +19,6 @@ pub mod hyperelastic;
 pub mod impact_scenes;
 pub mod impacts;
 pub mod large;
-pub mod masses;
-pub mod measure;
 pub mod mindlin;
 pub mod obstacles;
 pub mod on_system;
@@ -34,7 +31,6 @@ pub mod schemes;
 pub mod second_order;
 pub mod slabs;
 pub mod solids;
-pub mod sparse;
 pub mod springs;
 pub mod squeeze;
 pub mod stacks;
@@ -43,6 +39,5 @@ pub mod two_slabs;
 pub mod wall_bar;
 pub mod well;
 
-pub use bars::{Bars, MassKind};
-pub use measure::{Figures, Record, record};
+pub use contact_dynamics_bars::{Bars, Figures, MassKind, Record, bars, masses, measure, record, sparse};
 pub use on_system::OnSystem;
