@@ -16,9 +16,9 @@ pub(crate) struct DenseCholesky<T> {
     /// Size × size: the lower triangle of L row by row, or column by column if it is blocked; for LU both triangles
     /// row by row.
     l: Vec<T>,
-    /// First nonzero column of each row of L (its skyline); for LU the row exchanged with each pivot.
+    /// First nonzero column of each row of L (its skyline); for LU the rows in the order of their pivots.
     first: Vec<usize>,
-    /// Diagonal of the matrix.
+    /// Diagonal of the matrix; for LU the scale of each row and column.
     diagonal: Vec<T>,
     /// Rows that do not depend on earlier ones. The columns of L of dependent rows are zero.
     independent: Vec<usize>,
@@ -26,6 +26,8 @@ pub(crate) struct DenseCholesky<T> {
     /// Factor of LᵀL on the independent columns, if there are dependent ones.
     normal: Vec<T>,
     reduced: Vec<T>,
+    /// The inverse of the order of an LU.
+    inverse: Vec<usize>,
     scratch: Scratch,
 }
 
@@ -43,7 +45,7 @@ const BLOCKED: usize = 48;
 impl<T: Real> DenseCholesky<T> {
     pub(crate) fn with_capacity(size: usize) -> Self {
         let mut scratch = Scratch::default();
-        scratch.get(T::dense_cholesky_scratch(size));
+        scratch.get(T::dense_cholesky_scratch(size).or(T::dense_lu_scratch(size)));
         Self {
             size: 0,
             l: Vec::with_capacity(size * size),
@@ -53,17 +55,23 @@ impl<T: Real> DenseCholesky<T> {
             kind: Kind::Skyline,
             normal: Vec::with_capacity(size * size),
             reduced: Vec::with_capacity(size),
+            inverse: Vec::with_capacity(size),
             scratch,
         }
     }
 
     /// Memory for [`factorize_general`](Self::factorize_general) only.
     pub(crate) fn with_general_capacity(size: usize) -> Self {
+        let mut scratch = Scratch::default();
+        scratch.get(T::dense_lu_scratch(size));
         Self {
             l: Vec::with_capacity(size * size),
             first: Vec::with_capacity(size),
             diagonal: Vec::with_capacity(size),
             independent: Vec::with_capacity(size),
+            reduced: Vec::with_capacity(size),
+            inverse: Vec::with_capacity(size),
+            scratch,
             ..Self::default()
         }
     }
@@ -151,68 +159,52 @@ impl<T: Real> DenseCholesky<T> {
     }
 
     /// Factorizes a general matrix with entries `entry(i, j)` and a nonnegative diagonal by LU with partial pivoting.
-    /// Rows and columns are scaled by the roots of the diagonal.
+    /// Rows and columns are scaled by powers of two near the roots of the diagonal, relative to its largest entry: in
+    /// units that differ by a power of two the digits are the same.
     ///
-    /// If a pivot is lost in rounding, the matrix is singular: the factorization stops and cannot be used to solve.
-    /// `Err(row)` as from [`factorize`](Self::factorize).
+    /// If a pivot is lost in rounding, the matrix is singular: the factor cannot be used to solve. `Err(row)` as from
+    /// [`factorize`](Self::factorize).
     pub(crate) fn factorize_general(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
-        let Self { l, first: exchanges, diagonal, independent, kind, .. } = self;
+        let Self { l, first: order, diagonal: scale, independent, inverse, kind, scratch, .. } = self;
         (self.size, *kind) = (size, Kind::General);
+        let own = |i: usize| entry(i, i);
+        if let Some(i) = (0..size).find(|&i| !(own(i) >= T::zero() && own(i).is_finite())) {
+            return Err(i);
+        }
+        let exponent = |i: usize| i32::from(own(i).integer_decode().1);
+        let largest = (0..size).map(exponent).max().unwrap_or(0);
+        scale.clear();
+        scale.extend((0..size).map(|i| T::of(2.0).powi((largest - exponent(i)) / 2)));
         l.clear();
-        exchanges.clear();
-        diagonal.clear();
-        independent.clear();
         for i in 0..size {
-            l.extend((0..size).map(|j| entry(i, j)));
-            let row = &l[i * size..];
-            diagonal.push(row[i].sqrt());
-            if !(row[i] >= T::zero() && T::all_finite(row)) {
+            l.extend((0..size).map(|j| entry(i, j) * scale[i] * scale[j]));
+            if !T::all_finite(&l[i * size..]) {
                 return Err(i);
             }
         }
-        let dependent = rounding(T::of(size as f64));
-        // `diagonal` is permuted with the rows; the scale of a column is computed before that.
-        for k in 0..size {
-            let measure = entry(k, k).sqrt();
-            let share = |i: usize| l[i * size + k].abs() / diagonal[i];
-            let pivot = (k + 1..size).fold(k, |best, i| if share(i) > share(best) { i } else { best });
-            // Written so that NaN, from a zero diagonal, counts as singular.
-            let sound = share(pivot) > dependent * measure;
-            if !sound {
-                return Ok(());
-            }
-            exchanges.push(pivot);
-            independent.push(k);
-            if pivot != k {
-                diagonal.swap(k, pivot);
-                let (upper, lower) = l.split_at_mut(pivot * size);
-                upper[k * size..(k + 1) * size].swap_with_slice(&mut lower[..size]);
-            }
-            let (done, rest) = l.split_at_mut((k + 1) * size);
-            let pivots = &done[k * size..];
-            for row in rest.chunks_exact_mut(size) {
-                let factor = row[k] / pivots[k];
-                row[k] = factor;
-                if factor != T::zero() {
-                    T::axpy(-factor, &pivots[k + 1..], &mut row[k + 1..]);
-                }
-            }
+        for list in [&mut *order, inverse] {
+            list.clear();
+            list.resize(size, 0);
         }
+        let memory = scratch.get(T::dense_lu_scratch(size));
+        T::dense_lu(size, l, [order, inverse], memory);
+        // Written so that NaN, from a zero diagonal, counts as singular.
+        let root = |i: usize| own(i).sqrt() * scale[i];
+        let dependent = rounding(T::of(size as f64));
+        let is_sound = |&k: &usize| l[k * size + k].abs() > dependent * root(k) * root(order[k]);
+        independent.clear();
+        independent.extend((0..size).take_while(is_sound));
         Ok(())
     }
 
-    /// Solves L U x = b in place.
-    fn solve_general(&self, x: &mut [T]) {
-        let Self { size: n, l, first: exchanges, .. } = self;
-        for (k, &pivot) in exchanges.iter().enumerate() {
-            x.swap(k, pivot);
-        }
-        for i in 0..*n {
-            x[i] -= dot(&l[i * n..i * n + i], &x[..i]);
-        }
-        for i in (0..*n).rev() {
-            let row = &l[i * n..(i + 1) * n];
-            x[i] = (x[i] - dot(&row[i + 1..], &x[i + 1..])) / row[i];
+    /// Solves with the scaled factors: x = D L⁻¹U⁻¹ P D b.
+    fn solve_general(&mut self, x: &mut [T]) {
+        let Self { size, l, first: order, diagonal: scale, reduced, .. } = self;
+        reduced.clear();
+        reduced.extend(order.iter().map(|&i| x[i] * scale[i]));
+        T::dense_lu_solve(*size, l, reduced);
+        for ((x, &scale), &solution) in x.iter_mut().zip(&*scale).zip(&*reduced) {
+            *x = solution * scale;
         }
     }
 
@@ -388,6 +380,23 @@ mod tests {
         assert!(factor.is_singular());
         assert_eq!(factor.factorize_general(2, |i, _| if i == 1 { f64::NAN } else { 1.0 }), Err(1));
         assert_eq!(factor.factorize_general(2, |i, j| if i == j { i as f64 - 1.0 } else { 0.0 }), Err(0));
+    }
+
+    #[test]
+    fn general_factors_have_the_same_digits_in_other_units() {
+        for n in [1, 2, 3, 9, 40, 90] {
+            let a = |i: usize, j: usize| ((i * 13 + j * 7 + i * j * j) as f64).sin() + if i == j { 2.0 } else { 0.0 };
+            let solution = |unit: f64| -> Vec<u64> {
+                let mut factor = DenseCholesky::with_general_capacity(n);
+                factor.factorize_general(n, |i, j| unit * a(i, j)).unwrap();
+                let mut x: Vec<f64> = (0..n).map(|i| unit * (i as f64).cos()).collect();
+                factor.solve(&mut x);
+                x.iter().map(|x| x.to_bits()).collect()
+            };
+            for power in [-59, 61, 1] {
+                assert_eq!(solution(1.0), solution(2.0_f64.powi(power)), "{n}, {power}");
+            }
+        }
     }
 
     #[test]

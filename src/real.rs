@@ -149,6 +149,13 @@ kernels! {
     fn dense_cholesky_scratch(size: usize) -> StackReq = cholesky::dense_scratch::<Self>;
     /// Solves L Lᵀ x = b in place.
     fn dense_cholesky_solve(size: usize, values: &[Self], x: &mut [Self]) = cholesky::dense_solve;
+    /// Factorizes a dense row-major matrix into L U with partial pivoting, in place. `order` receives the rows in the
+    /// order of their pivots, and the inverse of this order.
+    fn dense_lu(size: usize, values: &mut [Self], order: [&mut [usize]; 2], memory: &mut MemBuffer) = lu::dense;
+    /// Scratch for [`dense_lu`](Self::dense_lu).
+    fn dense_lu_scratch(size: usize) -> StackReq = lu::dense_scratch::<Self>;
+    /// Solves L U x = b in place, with b in the order of the pivots.
+    fn dense_lu_solve(size: usize, values: &[Self], x: &mut [Self]) = lu::dense_solve;
     /// Scales a matrix in blocks of `size`² by the Cholesky factors of its diagonal blocks, which are replaced by
     /// their inverses; `Err` is the dof of a pivot that is not positive.
     fn scale_blocks(

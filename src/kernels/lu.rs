@@ -1,11 +1,14 @@
-//! Sparse LU.
+//! LU of sparse and of dense matrices.
 
 use crate::scalar::Scalar;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::lu::partial_pivoting::factor::{lu_in_place, lu_in_place_scratch};
+use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::prelude::ReborrowMut;
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu};
-use faer::{Conj, MatMut, Par, Spec};
+use faer::{Conj, MatMut, MatRef, Par, Spec};
 
 /// Factorizes with partial pivoting; the error has the failing column in the elimination order.
 #[inline]
@@ -36,4 +39,31 @@ pub(crate) fn solve<T: Scalar>(
 pub(crate) fn scratch<T: Scalar>(symbolic: &SymbolicLu<usize>, columns: usize) -> StackReq {
     let solve = symbolic.solve_in_place_scratch::<T>(columns, Par::Seq);
     solve.or(symbolic.factorize_numeric_lu_scratch::<T>(Par::Seq, Spec::default()))
+}
+
+/// Factorizes a dense row-major matrix with partial pivoting, in place. `order` receives the rows in the order of their
+/// pivots, and the inverse of this order.
+pub(crate) fn dense<T: Scalar>(
+    size: usize,
+    values: &mut [T],
+    [order, inverse]: [&mut [usize]; 2],
+    memory: &mut MemBuffer,
+) {
+    let a = MatMut::from_row_major_slice_mut(values, size, size);
+    lu_in_place(a, order, inverse, Par::Seq, MemStack::new(memory), Spec::default());
+}
+
+/// Scratch for [`dense`].
+#[inline]
+pub(crate) fn dense_scratch<T: Scalar>(size: usize) -> StackReq {
+    lu_in_place_scratch::<usize, T>(size, size, Par::Seq, Spec::default())
+}
+
+/// Solves L U x = b in place, with b in the order of the pivots.
+#[inline]
+pub(crate) fn dense_solve<T: Scalar>(size: usize, values: &[T], x: &mut [T]) {
+    let factors = MatRef::from_row_major_slice(values, size, size);
+    let mut x = MatMut::from_column_major_slice_mut(x, size, 1);
+    solve_unit_lower_triangular_in_place(factors, x.rb_mut(), Par::Seq);
+    solve_upper_triangular_in_place(factors, x, Par::Seq);
 }
