@@ -55,7 +55,7 @@ pub use obstacle::ClosedSurface;
 pub use obstacle::{Capsule, Cone, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};
 pub use rigid_motion::RigidMotion;
 pub use rows::{ContactJacobian, GapRates};
-pub(crate) use rows::{NO_RESPONSE, SpreadRow};
+pub(crate) use rows::{NO_RESPONSE, RowProducts};
 #[cfg(feature = "mesh-contact")]
 pub use surface::{Facet, Surface};
 #[cfg(feature = "mesh-contact")]

@@ -214,28 +214,56 @@ impl<T: Real> ContactJacobian<T> {
     }
 }
 
-/// A row of G as a dense vector: its product with another row costs only the entries of that row.
+/// Products of vectors with the rows of a list. Most rows share no dof with a vector and are not visited.
 #[derive(Debug, Default)]
-pub(crate) struct SpreadRow<T> {
-    /// Zero outside of `of`.
+pub(crate) struct RowProducts<T> {
+    /// (dof, index of a row that acts on it), ascending.
+    acting: Vec<(usize, usize)>,
+    /// For each row the vector that has visited it last, counted from 1.
+    visited: Vec<usize>,
+    vectors: usize,
+    /// A vector by dof; zero outside of `each`.
     weights: Vec<T>,
 }
 
-impl<T: Real> SpreadRow<T> {
-    /// For rows on this number of dofs.
-    pub(crate) fn new(dofs: usize) -> Self {
-        Self { weights: vec![T::zero(); dofs] }
-    }
-
-    /// Grows to rows on this number of dofs.
-    pub(crate) fn reserve(&mut self, dofs: usize) {
+impl<T: Real> RowProducts<T> {
+    /// Memory for rows on this number of dofs.
+    pub(crate) fn reserve(&mut self, rows: usize, dofs: usize) {
+        self.acting.reserve(16 * rows);
+        self.visited.reserve(rows);
         self.weights.resize(dofs.max(self.weights.len()), T::zero());
     }
 
-    /// Calls `act` with the weights of a row, by dof.
-    pub(crate) fn of<I: Iterator<Item = (usize, T)>>(&mut self, row: impl Fn() -> I, act: impl FnOnce(&[T])) {
-        row().for_each(|(dof, weight)| self.weights[dof] += weight);
-        act(&self.weights);
-        row().for_each(|(dof, _)| self.weights[dof] = T::zero());
+    /// Lists rows, of which `row` returns the (dof, weight) pairs, on this number of dofs.
+    pub(crate) fn list<R: Iterator<Item = (usize, T)>>(&mut self, rows: usize, dofs: usize, row: impl Fn(usize) -> R) {
+        self.weights.resize(dofs.max(self.weights.len()), T::zero());
+        self.visited.clear();
+        self.visited.resize(rows, 0);
+        self.vectors = 0;
+        self.acting.clear();
+        self.acting.extend((0..rows).flat_map(|k| row(k).map(move |(dof, _)| (dof, k))));
+        self.acting.sort_unstable();
+    }
+
+    /// Calls `put` with the index of each row that shares a dof with a vector, and their product.
+    pub(crate) fn each<V: Iterator<Item = (usize, T)>, R: Iterator<Item = (usize, T)>>(
+        &mut self,
+        vector: impl Fn() -> V,
+        row: impl Fn(usize) -> R,
+        mut put: impl FnMut(usize, T),
+    ) {
+        let Self { acting, visited, vectors, weights } = self;
+        *vectors += 1;
+        vector().for_each(|(dof, weight)| weights[dof] += weight);
+        for (dof, _) in vector() {
+            let first = acting.partition_point(|&(other, _)| other < dof);
+            for &(_, k) in acting[first..].iter().take_while(|&&(other, _)| other == dof) {
+                if visited[k] != *vectors {
+                    visited[k] = *vectors;
+                    put(k, row(k).map(|(dof, weight)| weight * weights[dof]).sum());
+                }
+            }
+        }
+        vector().for_each(|(dof, _)| weights[dof] = T::zero());
     }
 }

@@ -1,6 +1,6 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
-use crate::contact::{ContactId, ContactJacobian, Groups, SpreadRow};
+use crate::contact::{ContactId, ContactJacobian, Groups, RowProducts};
 use crate::contact_solver::FORESEEN;
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
@@ -58,8 +58,8 @@ pub struct JumpProjection<T: Real> {
     factors: Vec<DenseCholesky<T>>,
     /// The right-hand side of a group.
     gathered: Vec<T>,
-    /// M⁻¹ G_iᵀ of a row; lumped masses only.
-    spread: SpreadRow<T>,
+    /// Products of M⁻¹ G_iᵀ with the rows; lumped masses only.
+    products: RowProducts<T>,
     /// Whether roots and factors belong to `closed`.
     factored: bool,
 }
@@ -135,6 +135,8 @@ impl<T: Real> JumpProjection<T> {
         };
         // Columns of small systems are reserved at once; they take little memory.
         let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
+        let mut products = RowProducts::default();
+        products.reserve(keys.min(rows), keys);
         Ok(Self {
             inverse,
             dofs,
@@ -151,7 +153,7 @@ impl<T: Real> JumpProjection<T> {
             roots: Vec::with_capacity(rows),
             factors: vec![DenseCholesky::with_capacity(rows.min(FORESEEN))],
             gathered: Vec::with_capacity(rows),
-            spread: SpreadRow::new(keys),
+            products,
             factored: false,
         })
     }
@@ -217,17 +219,16 @@ impl<T: Real> JumpProjection<T> {
         self.sort(g, rows);
         let mut roots = std::mem::take(&mut self.roots);
         let mut factors = std::mem::take(&mut self.factors);
-        let mut spread = std::mem::take(&mut self.spread);
-        spread.reserve(self.dofs_of_lumped());
+        let mut products = self.list(g, rows);
         roots.clear();
         let (mut result, mut used) = (Ok(()), 0);
         for group in 0..self.groups.len() {
             let own = self.groups.group(group);
-            let mut root = [T::zero()];
+            let mut root = T::zero();
             if let &[only] = own {
-                self.couple(g, rows[only], [rows[only]].into_iter(), &mut spread, &mut root);
+                self.couple((g, rows), (only, own.iter().copied()), &mut products, |_, square| root = square);
             }
-            let root = root[0].sqrt();
+            let root = root.sqrt();
             roots.push(root);
             if own.len() == 1 && root.is_finite() {
                 continue;
@@ -236,12 +237,17 @@ impl<T: Real> JumpProjection<T> {
                 factors.push(DenseCholesky::default());
             }
             let fill = |i: usize, row: &mut [T]| {
-                self.couple(g, rows[own[i]], own.iter().map(|&position| rows[position]), &mut spread, row);
+                row.fill(T::zero());
+                let others = own[..=i].iter().copied();
+                self.couple((g, rows), (own[i], others), &mut products, |position, product| {
+                    let place = own.binary_search(&position).ok();
+                    place.and_then(|j| row.get_mut(j)).into_iter().for_each(|entry| *entry = product);
+                });
             };
             result = result.and(factors[used].factorize_rows(own.len(), fill).map_err(|i| refuse(rows[own[i]])));
             used += 1;
         }
-        (self.roots, self.factors, self.spread) = (roots, factors, spread);
+        (self.roots, self.factors, self.products) = (roots, factors, products);
         result?;
         self.factored = true;
         Ok(())
@@ -374,15 +380,23 @@ impl<T: Real> JumpProjection<T> {
     /// S of `rows`, dense and column-major.
     pub(crate) fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
         self.prepare(g, rows)?;
-        let mut spread = std::mem::take(&mut self.spread);
-        spread.reserve(self.dofs_of_lumped());
         s.clear();
         s.resize(rows.len() * rows.len(), T::zero());
-        for (&j, column) in rows.iter().zip(s.chunks_exact_mut(rows.len().max(1))) {
-            self.couple(g, j, rows.iter().copied(), &mut spread, column);
+        let mut products = self.list(g, rows);
+        for (j, column) in s.chunks_exact_mut(rows.len().max(1)).enumerate() {
+            self.couple((g, rows), (j, 0..rows.len()), &mut products, |i, product| column[i] = product);
         }
-        self.spread = spread;
+        self.products = products;
         Ok(())
+    }
+
+    /// The products of a lumped mass for these rows.
+    fn list(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> RowProducts<T> {
+        let mut products = std::mem::take(&mut self.products);
+        if matches!(self.inverse, InverseMass::Lumped(_)) {
+            products.list(rows.len(), self.dofs, |k| g.row(rows[k]));
+        }
+        products
     }
 
     /// Computes the columns needed for S of these rows.
@@ -430,32 +444,24 @@ impl<T: Real> JumpProjection<T> {
         })
     }
 
-    /// Entries (i, j) of S = G M⁻¹ Gᵀ for the first `out.len()` of the `others` j; rows must be prepared.
+    /// Entries of S = G M⁻¹ Gᵀ in column j of the `rows`, which must be prepared and listed, at least those at the
+    /// positions given; entries that are left out are zero.
     fn couple(
         &self,
-        g: &ContactJacobian<T>,
-        i: usize,
-        others: impl Iterator<Item = usize>,
-        spread: &mut SpreadRow<T>,
-        out: &mut [T],
+        (g, rows): (&ContactJacobian<T>, &[usize]),
+        (j, positions): (usize, impl Iterator<Item = usize>),
+        products: &mut RowProducts<T>,
+        mut put: impl FnMut(usize, T),
     ) {
-        let pairs = out.iter_mut().zip(others);
         match &self.inverse {
-            InverseMass::Lumped(inverse) => spread.of(
-                || g.row(i).map(|(dof, weight)| (dof, weight * inverse[dof])),
-                |response| {
-                    pairs.for_each(|(entry, j)| *entry = g.product(j, response));
-                },
-            ),
+            InverseMass::Lumped(inverse) => {
+                let response = || g.row(rows[j]).map(|(dof, weight)| (dof, weight * inverse[dof]));
+                products.each(response, |i| g.row(rows[i]), put);
+            }
             InverseMass::Consistent(inverse) => {
-                pairs.for_each(|(entry, j)| *entry = self.columns.of(j).product(inverse, g.row(i)));
+                positions.for_each(|i| put(i, self.columns.of(rows[i]).product(inverse, g.row(rows[j]))));
             }
         }
-    }
-
-    /// Number of dofs over which responses of a lumped mass are spread.
-    fn dofs_of_lumped(&self) -> usize {
-        if matches!(self.inverse, InverseMass::Lumped(_)) { self.dofs } else { 0 }
     }
 }
 

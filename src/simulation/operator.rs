@@ -12,7 +12,7 @@ pub(super) mod tangent;
 
 mod delassus;
 
-use crate::contact::{ContactJacobian, Groups, SpreadRow};
+use crate::contact::{ContactJacobian, Groups, RowProducts};
 use crate::contact_solver::{FORESEEN, MANY};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
@@ -54,8 +54,8 @@ pub(crate) struct Operator<T> {
 struct DiagonalResponses<T> {
     /// The responses of the interface to unit forces; empty until needed.
     reciprocals: Vec<T>,
-    /// The response to a row.
-    spread: SpreadRow<T>,
+    /// Products of the response to a row with all rows.
+    products: RowProducts<T>,
 }
 
 impl<T: Real> Operator<T> {
@@ -80,6 +80,10 @@ impl<T: Real> Operator<T> {
             _ => Vec::new(),
         };
         let unit = if varies { Unit::Row } else { unit };
+        let mut products = RowProducts::default();
+        if contact == ContactPath::Apart {
+            products.reserve(FORESEEN.min(interface.len()), interface.len());
+        }
         let mut operator = Self {
             matrix,
             factor,
@@ -87,7 +91,7 @@ impl<T: Real> Operator<T> {
             responses: Responses::new(unit, interface.len()),
             diagonal: DiagonalResponses {
                 reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
-                spread: SpreadRow::new(if contact == ContactPath::Apart { interface.len() } else { 0 }),
+                products,
             },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
@@ -118,7 +122,7 @@ impl<T: Real> Operator<T> {
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            diagonal: DiagonalResponses { reciprocals: Vec::new(), spread: SpreadRow::default() },
+            diagonal: DiagonalResponses { reciprocals: Vec::new(), products: RowProducts::default() },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
@@ -255,18 +259,16 @@ impl<T: Real> Operator<T> {
     /// Forms W of some rows, without compliances, from the W of other rows if it is known.
     fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], is_known: bool) -> Result<()> {
         self.prepare(g, rows)?;
-        let Self { delassus, responses, diagonal: DiagonalResponses { reciprocals, spread }, .. } = self;
+        let Self { delassus, responses, diagonal: DiagonalResponses { reciprocals, products }, .. } = self;
         let size = rows.len();
         match self.contact {
             ContactPath::Apart => {
                 delassus.begin(rows)?;
+                products.list(size, reciprocals.len(), |i| g.located(rows[i]));
                 for (k, &j) in rows.iter().enumerate() {
                     let response = || g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
-                    spread.of(response, |response| {
-                        for (entry, &i) in delassus.values[k..].iter_mut().step_by(size).zip(rows) {
-                            *entry = g.interface_product(i, response);
-                        }
-                    });
+                    let put = |i: usize, product| delassus.values[i * size + k] = product;
+                    products.each(response, |i| g.located(rows[i]), put);
                 }
             }
             ContactPath::Condensed | ContactPath::Full => {
@@ -288,11 +290,10 @@ impl<T: Real> Operator<T> {
     /// Computes responses to unit forces on all dofs that some rows act on.
     fn prepare(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         let Self { contact, factor, interface, full, responses, diagonal, .. } = self;
-        let DiagonalResponses { reciprocals, spread } = diagonal;
+        let reciprocals = &mut diagonal.reciprocals;
         if *contact == ContactPath::Apart {
             if reciprocals.is_empty() {
                 reciprocals.resize(interface.len(), T::one());
-                spread.reserve(interface.len());
                 let found = respond((*contact, &mut **factor), interface, full, reciprocals);
                 return found.inspect_err(|_| reciprocals.clear());
             }
