@@ -28,8 +28,9 @@ pub(super) struct ConeNewton<T> {
     offset: Vec<T>,
 }
 
-/// Sweeps before the first attempt of Newton's method, at least, and before later ones.
-const FIRST_SWEEPS: usize = 3;
+/// Sweeps before the first attempt of Newton's method, at least and at most, and before later ones. More than these
+/// cost more than the iteration that they save.
+const FIRST_SWEEPS: [usize; 2] = [3, 20];
 const MORE_SWEEPS: usize = 50;
 
 /// Newton iterations of an attempt, and the number of attempts, each from more sweeps.
@@ -67,10 +68,11 @@ impl<T: Real> ConeNewton<T> {
             *self = Self::with_capacity(size);
         }
         let mut spent = 0;
-        // A sweep costs about 3/n of a Newton iteration: first up to half an iteration's worth of sweeps, as long as
-        // they converge.
+        // A sweep costs about 3/n of an iteration with few rows: first up to half of an iteration's worth of sweeps, as
+        // long as they converge.
+        let [least, most] = FIRST_SWEEPS;
         for round in 0..ROUNDS {
-            let sweeps = if round == 0 { FIRST_SWEEPS.max(size / 6) } else { MORE_SWEEPS };
+            let sweeps = if round == 0 { (size / 6).clamp(least, most) } else { MORE_SWEEPS };
             let schedule = Schedule { omega: T::one(), sweeps, impatient: true };
             if self.sweeps.solve(acceptance, symmetry, schedule, &mut spent, multipliers)
                 || self.newton(acceptance, &mut spent, multipliers)
