@@ -229,7 +229,7 @@ pub(crate) struct RowProducts<T> {
 impl<T: Real> RowProducts<T> {
     /// Memory for rows on this number of dofs.
     pub(crate) fn reserve(&mut self, rows: usize, dofs: usize) {
-        self.acting.reserve(16 * rows);
+        self.acting.reserve(4 * rows);
         self.visited.reserve(rows);
         self.weights.resize(dofs.max(self.weights.len()), T::zero());
     }
