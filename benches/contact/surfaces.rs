@@ -19,7 +19,7 @@ const RATIOS: &[Ratio] = &[
 ];
 
 pub(super) fn measure(arguments: &Arguments) {
-    for n in if arguments.quick { vec![3] } else { vec![9, 17] } {
+    for n in if arguments.quick { vec![3] } else { vec![9, 17, 29] } {
         scene(n, arguments);
     }
 }
