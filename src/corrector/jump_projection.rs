@@ -136,7 +136,7 @@ impl<T: Real> JumpProjection<T> {
         // Columns of small systems are reserved at once; they take little memory.
         let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
         let mut products = RowProducts::default();
-        products.reserve(keys.min(rows), keys);
+        products.reserve(keys.min(rows).min(FORESEEN), keys);
         Ok(Self {
             inverse,
             dofs,

@@ -5,9 +5,7 @@ use super::inverse::check_definite;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
-use crate::sparse;
-use crate::sparse::assembled;
-use crate::sparse::check_vector;
+use crate::sparse::{self, assembled, check_vector};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeMap;
 

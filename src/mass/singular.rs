@@ -3,8 +3,7 @@
 use super::assembly::{check_element, flags};
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::sparse;
-use crate::sparse::assembled;
+use crate::sparse::{self, assembled};
 use faer::sparse::{SparseColMat, SparseColMatRef};
 use std::collections::BTreeMap;
 
