@@ -115,9 +115,8 @@ mod tests {
             let visible: String = text.split("<!--").map(|part| part.rsplit("-->").next().unwrap_or("")).collect();
             let words = visible.split_whitespace().collect::<Vec<_>>().join(" ");
             let paths = words.split('`').skip(1).step_by(2).filter(|word| is_path(word) && !is_packaged(word));
-            let commands = visible.lines().filter(|line| {
-                line.contains("cargo ") && flags.iter().any(|flag| line.contains(flag)) && !line.contains("cargo add")
-            });
+            let is_command = |line: &&str| line.contains("cargo ") && flags.iter().any(|flag| line.contains(flag));
+            let commands = visible.lines().filter(is_command);
             let needing: Vec<_> = paths.chain(commands).collect();
             let says = ["in the repository", "In the repository", "In a checkout", "in a checkout"];
             assert!(needing.is_empty() || says.iter().any(|say| words.contains(say)), "{page}: {needing:?}");

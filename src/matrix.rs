@@ -1,6 +1,6 @@
 //! Sparse matrices from the arrays of other codes: compressed rows (CSR) or columns (CSC), whole or one triangle.
 //!
-//! The arrays are those of most libraries, under the names of SciPy: `indptr` has the start of each row (or column) in
+//! Most libraries have these arrays; their names here are SciPy's. `indptr` has the start of each row (or column) in
 //! the two others, and their length at its end; `indices` has the column (or row) of each entry, and `data` its value.
 //! Entries may come in any order; entries at the same place are added up.
 //!

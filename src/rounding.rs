@@ -26,7 +26,7 @@ pub(crate) fn share_of_rounding<T: Float>() -> T {
 /// √ε, half of the digits: values that agree to this share agree as far as solves with a matrix of unknown condition
 /// can tell; the share by which values are changed for a difference that keeps half of the digits, and by which
 /// rounding may move a solved force beyond its bound. Distances below this share of the size of a facet have no
-/// direction; entries of a rotation differ by less from those of an orthonormal matrix.
+/// direction; a matrix is a rotation if it differs from an orthonormal one by less.
 pub(crate) fn half_digits<T: Float>() -> T {
     T::epsilon().sqrt()
 }
