@@ -2,7 +2,6 @@
 
 mod acceptance;
 mod active_set;
-mod applied;
 mod cone;
 mod cone_newton;
 mod equations;
@@ -11,17 +10,18 @@ mod gauss_seidel;
 mod many_rows;
 mod pivoting;
 mod problem;
+mod projected_cg;
 mod projected_gradient;
 mod structure;
 mod sweeps;
 
 pub use crate::contact_failure::ContactFailure;
 pub use active_set::ActiveSet;
-pub use applied::AppliedProblem;
 pub(crate) use failure::{contact_error, no_response};
 pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
 pub use problem::{AdmissibleSet, ContactProblem};
+pub(crate) use projected_cg::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;
@@ -31,6 +31,24 @@ pub(crate) const FORESEEN: usize = 128;
 
 /// From this many rows on, cubic cost is avoided, and so is one solve per row in repeated assemblies.
 pub(crate) const MANY: usize = 256;
+
+/// Whether the Delassus operator W = G A⁻¹ Gᵀ of a contact problem is formed.
+///
+/// Without W the problem is solved by projected conjugate gradients (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23,
+/// 2001) on the displacements: products with A, as many as for a system without contact. Forces are the same to eleven
+/// digits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Assembly {
+    /// Whichever is less work, counted from the sizes of the problem; if the iteration does not converge, W is formed.
+    #[default]
+    Automatic,
+    /// Always.
+    Always,
+    /// Never: a problem of which the iteration does not converge is an error. Contacts whose force is known, contacts
+    /// on dofs without mass, unsymmetric matrices and diagonal ones have W in any case.
+    Never,
+}
 
 /// A solver of [`ContactProblem`]s.
 ///
@@ -73,26 +91,15 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
         multipliers: &mut [T],
     ) -> std::result::Result<usize, ContactFailure<T>>;
 
-    /// Solves a problem with a matrix-free W, like [`solve`](Self::solve): for hundreds of rows on a body whose
-    /// matrix changes with every iteration. If this returns an error or `None`, W is formed and
-    /// [`solve`](Self::solve) called. Default: `None`, for solvers that need the entries of W.
-    fn solve_applied(
-        &mut self,
-        problem: &mut AppliedProblem<'_, T>,
-        multipliers: &mut [T],
-    ) -> Option<std::result::Result<usize, ContactFailure<T>>> {
-        let _ = (problem, multipliers);
-        None
+    /// Whether a run may solve problems itself, without W, in the place of this solver. Default: no.
+    fn assembly(&self) -> Assembly {
+        Assembly::Always
     }
 }
 
 impl<T: Real, S: ContactSolver<T> + ?Sized> ContactSolver<T> for Box<S> {
-    fn solve_applied(
-        &mut self,
-        problem: &mut AppliedProblem<'_, T>,
-        multipliers: &mut [T],
-    ) -> Option<std::result::Result<usize, ContactFailure<T>>> {
-        (**self).solve_applied(problem, multipliers)
+    fn assembly(&self) -> Assembly {
+        (**self).assembly()
     }
     fn admits(&self, set: AdmissibleSet) -> bool {
         (**self).admits(set)

@@ -6,6 +6,7 @@ mod correction;
 mod jump_problem;
 mod jump_projection;
 mod laursen_love;
+mod many_jumps;
 mod nonsmooth_splitting;
 mod persistency;
 mod prediction;

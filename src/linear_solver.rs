@@ -112,6 +112,11 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// Number of stored values: the memory of the factor, in scalars.
     fn stored_values(&self) -> usize;
 
+    /// Whether it takes matrices as symmetric, so that products may do the same. Default: no.
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+
     /// Iterations of the last solve, the largest number of its columns; zero for direct solvers.
     fn iterations(&self) -> usize {
         0

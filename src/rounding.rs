@@ -75,6 +75,12 @@ pub(crate) fn conditioned_share<T: Float>() -> T {
     T::epsilon().powf(number(0.4))
 }
 
+/// The residual of the balance, in the energy of unit motions and relative to the contact forces, at which an iteration
+/// without W ends: forces then have eleven digits.
+pub(crate) fn projected_residual<T: Float>() -> T {
+    number::<T>(1e-12).max(number::<T>(8.0) * T::epsilon())
+}
+
 /// Gaps below this have lost their digits, as of motions that have died out: they need no solve. A length.
 pub(crate) fn smallest_gap<T: Float>() -> T {
     T::min_positive_value() / T::epsilon()

@@ -23,11 +23,6 @@ impl<T: Real> Default for Settings<T> {
 }
 
 impl<T: Real> Settings<T> {
-    /// The admissible residual, as a fraction of the largest |q_i|.
-    pub(super) fn tolerance(&self) -> T {
-        self.tolerance
-    }
-
     pub(super) fn with_tolerance(self, tolerance: f64) -> Result<Self> {
         match (0.0..1.0).contains(&tolerance) {
             true => Ok(Self { tolerance: T::of(tolerance), ..self }),

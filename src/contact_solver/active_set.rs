@@ -1,11 +1,10 @@
 //! Primal–dual active set with a finite safeguard: exact up to rounding.
 
 use super::acceptance::{Acceptance, Gaps, Settings};
-use super::applied::{AppliedProblem, AppliedSet};
 use super::cone_newton::ConeNewton;
 use super::equations::Equations;
 use super::structure::Structure;
-use super::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
+use super::{AdmissibleSet, Assembly, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
 use crate::real::Real;
 use crate::rounding::half_digits;
 
@@ -20,9 +19,8 @@ use crate::rounding::half_digits;
 ///
 /// From 256 active rows on, the equations are solved by conjugate gradients with a factorized sparse approximate
 /// inverse (Kolotilin and Yeremin, SIAM J. Matrix Anal. Appl. 14, 1993), each to its rounding, if no row depends on
-/// its neighbors; otherwise by the factor. Problems with a matrix-free W
-/// ([`solve_applied`](ContactSolver::solve_applied)) use block exchanges only and return an error if these do not
-/// end.
+/// its neighbors; otherwise by the factor. Where forming W would be more work than the whole solution without it, a
+/// run solves without W ([`Assembly`]).
 ///
 /// Redundant rows (the same contact twice, four contacts on a rigid face) leave W semidefinite. If active rows depend
 /// on one another, the same exchanges solve a sequence of proximal problems with W + d I, each positive definite
@@ -46,7 +44,7 @@ use crate::rounding::half_digits;
 #[derive(Clone, Debug, Default)]
 pub struct ActiveSet<T = f64> {
     equations: Equations<T>,
-    applied: AppliedSet<T>,
+    assembly: Assembly,
     structure: Structure,
     active: Vec<bool>,
     /// The active rows, and their multipliers.
@@ -68,6 +66,12 @@ const BLOCK_TRIES: usize = 3;
 const PROXIMAL_STEPS: usize = 60;
 
 impl<T: Real> ActiveSet<T> {
+    /// Sets whether W is formed. Default: whichever is less work.
+    #[must_use]
+    pub fn with_assembly(self, assembly: Assembly) -> Self {
+        Self { assembly, ..self }
+    }
+
     /// Solves a proximal step by exchanges of rows: 0 ≤ y + d (λ − c) ⊥ λ ≥ 0 with the shift d of the diagonal of W and
     /// the center c. With a shift of zero this is the problem itself. Returns the number of iterations, and whether the
     /// step is solved; if not, the shift is zero and some active rows depend on one another.
@@ -198,6 +202,7 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         let mut pivoting = Pivoting::default();
         pivoting.reserve(size.min(FORESEEN));
         *self = Self {
+            assembly: self.assembly,
             equations: Equations::with_capacity(size),
             structure: Structure::with_capacity(size),
             active: Vec::with_capacity(size),
@@ -211,12 +216,8 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
         };
     }
 
-    fn solve_applied(
-        &mut self,
-        problem: &mut AppliedProblem<'_, T>,
-        multipliers: &mut [T],
-    ) -> Option<Result<usize, ContactFailure<T>>> {
-        Some(self.applied.solve(problem, multipliers))
+    fn assembly(&self) -> Assembly {
+        self.assembly
     }
 
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {

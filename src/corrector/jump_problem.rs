@@ -1,9 +1,10 @@
 //! The contact problem of S = G M⁻¹ Gᵀ in total multipliers: the jumps already contain a part of them.
 
 use super::JumpProjection;
+use super::many_jumps::ManyRows;
 use crate::contact::{ContactId, ContactJacobian};
 use crate::contact_solver::{
-    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, contact_error, no_response,
+    AdmissibleSet, Assembly, ContactFailure, ContactProblem, ContactSolver, FORESEEN, MANY, contact_error, no_response,
 };
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
@@ -57,12 +58,12 @@ pub(crate) struct JumpProblem<T> {
     pub(super) blocks: Vec<Block<T>>,
     /// The rows, and the block of each.
     pub(crate) rows: Vec<usize>,
-    owners: Vec<usize>,
+    pub(super) owners: Vec<usize>,
     /// G x of these rows minus the required rates, and its rounding error.
     pub(super) jump: Vec<T>,
     pub(super) tolerance: Vec<T>,
     /// The multipliers that the jumps already contain.
-    base: Vec<T>,
+    pub(super) base: Vec<T>,
     /// The total multipliers, and their increments over `base`.
     pub(crate) totals: Vec<T>,
     pub(super) increments: Vec<T>,
@@ -72,6 +73,7 @@ pub(crate) struct JumpProblem<T> {
     /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
     directions: Vec<(usize, [T; 2])>,
     group: Group<T>,
+    pub(super) many: Box<ManyRows<T>>,
 }
 
 /// How the friction of sliding contacts enters a problem.
@@ -185,13 +187,22 @@ impl<T: Real> JumpProblem<T> {
         }
         // Contacts that stick and slide in turn would leave no factor of S to keep.
         let has_friction = self.rows.iter().any(|&row| g.is_tangential(row));
-        if !has_friction && self.blocks.iter().all(Block::is_equation) {
+        let large = match solver.assembly() {
+            Assembly::Always => usize::MAX,
+            Assembly::Automatic => MANY,
+            Assembly::Never => 1,
+        };
+        let is_large = self.rows.len() >= large && projection.lumped().is_some();
+        if !has_friction && !is_large && self.blocks.iter().all(Block::is_equation) {
             return self.solve_equations(g, projection, |row| no_response(t, id(row)));
         }
         projection.sort(g, &self.rows);
         let mut group = std::mem::take(&mut self.group);
         let mut result = Ok(());
         for number in 0..projection.groups().len() {
+            if is_large && self.solve_without_s((g, projection), (number, large), presses) {
+                continue;
+            }
             // Positions of a group ascend, and a block is in one group.
             group.rows.clear();
             group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
@@ -273,7 +284,7 @@ impl<T: Real> JumpProblem<T> {
 
     /// Scales friction back into its cone if it was accepted outside as rounding. Next to much heavier bodies this
     /// rounding far exceeds the rounding of the local contact forces.
-    fn keep_in_cones(&mut self, positions: &[usize], presses: T) {
+    pub(super) fn keep_in_cones(&mut self, positions: &[usize], presses: T) {
         for &position in positions {
             let block = self.blocks[self.owners[position]];
             let is_found = block.place == position && block.direction.is_none() && block.known.is_none();

@@ -333,6 +333,14 @@ impl<T: Real> JumpProjection<T> {
         self.factored = false;
     }
 
+    /// M⁻¹, if it is diagonal.
+    pub(crate) fn lumped(&self) -> Option<&[T]> {
+        match &self.inverse {
+            InverseMass::Lumped(inverse) => Some(inverse),
+            InverseMass::Consistent(_) => None,
+        }
+    }
+
     /// The groups of the last [`sort`](Self::sort).
     pub(crate) fn groups(&self) -> &Groups {
         &self.groups

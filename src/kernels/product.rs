@@ -107,10 +107,28 @@ pub struct Supervariable {
     pub first: u32,
 }
 
-/// Some columns of a symmetric matrix (both triangles stored), read from the diagonal down.
+impl Supervariable {
+    /// Number of entries of its columns at and below its block, with so many groups of rows below.
+    pub(crate) fn entries(self, groups: usize) -> usize {
+        let width = usize::from(self.width);
+        width * (width + groups * usize::from(self.group))
+    }
+}
+
+/// Where the entries of a symmetric matrix at and below the diagonal are read.
+#[derive(Clone, Copy, Debug)]
+pub enum LowerEntries<'a, T> {
+    /// In a matrix with both triangles.
+    Matrix(SparseColMatRef<'a, usize, T>),
+    /// One after the other, column by column, from the first of some columns on; of each supervariable the whole block
+    /// on the diagonal.
+    Packed(&'a [T]),
+}
+
+/// Some columns of a symmetric matrix, read from the diagonal down.
 #[derive(Clone, Copy, Debug)]
 pub struct LowerColumns<'a, T> {
-    pub matrix: SparseColMatRef<'a, usize, T>,
+    pub entries: LowerEntries<'a, T>,
     /// The supervariables of the columns, and the following one.
     pub supervariables: &'a [Supervariable],
     /// The first rows of the groups of all supervariables of the matrix.
@@ -138,32 +156,42 @@ impl<T: Scalar> WithSimd for LowerProduct<'_, T> {
     fn with_simd<S: Simd>(mut self, _: S) {
         let LowerColumns { supervariables, groups, .. } = self.columns;
         let start = supervariables[0].column as usize;
+        let mut at = 0;
         for pair in supervariables.windows(2) {
             let Supervariable { column, width, group, first } = pair[0];
             let (column, groups) = (column as usize, &groups[first as usize..pair[1].first as usize]);
             match (width, group) {
-                (3, 3) => self.supervariable::<3, 3>(column, groups, start),
-                (2, 2) => self.supervariable::<2, 2>(column, groups, start),
-                (3, _) => self.supervariable::<3, 1>(column, groups, start),
-                (2, _) => self.supervariable::<2, 1>(column, groups, start),
-                (_, _) => self.supervariable::<1, 1>(column, groups, start),
+                (3, 3) => self.supervariable::<3, 3>(column, groups, [start, at]),
+                (2, 2) => self.supervariable::<2, 2>(column, groups, [start, at]),
+                (3, _) => self.supervariable::<3, 1>(column, groups, [start, at]),
+                (2, _) => self.supervariable::<2, 1>(column, groups, [start, at]),
+                (_, _) => self.supervariable::<1, 1>(column, groups, [start, at]),
             }
+            at += pair[0].entries(groups.len());
         }
     }
 }
 
 impl<T: Scalar> LowerProduct<'_, T> {
-    /// W columns, whose rows below form groups of G. Each entry is read once for its row and its column.
+    /// W columns, whose rows below form groups of G, with their first packed entry at `at`. Each entry is read once for
+    /// its row and its column.
     #[inline(always)]
-    fn supervariable<const W: usize, const G: usize>(&mut self, column: usize, groups: &[u32], start: usize) {
+    fn supervariable<const W: usize, const G: usize>(
+        &mut self,
+        column: usize,
+        groups: &[u32],
+        [start, at]: [usize; 2],
+    ) {
         let Self { c, columns, x, y } = self;
-        let (pointers, values) = (columns.matrix.col_ptr(), columns.matrix.val());
-        let below = groups.len() * G;
+        let height = W + groups.len() * G;
         // The entries of a column are in ascending order of rows: the last ones are below the block.
-        let tails: [&[T]; W] = std::array::from_fn(|k| {
-            let end = pointers[column + k + 1];
-            &values[end - below - W..end]
-        });
+        let tails: [&[T]; W] = match columns.entries {
+            LowerEntries::Matrix(matrix) => std::array::from_fn(|k| {
+                let end = matrix.col_ptr()[column + k + 1];
+                &matrix.val()[end - height..end]
+            }),
+            LowerEntries::Packed(values) => std::array::from_fn(|k| &values[at + k * height..at + (k + 1) * height]),
+        };
         let own: [T; W] = std::array::from_fn(|k| x[column + k]);
         let pushed = own.map(|x| *c * x);
         let mut sums = [[T::zero(); G]; W];

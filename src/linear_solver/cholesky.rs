@@ -483,6 +483,10 @@ impl<T: Real> Factorization<T> for Factor<T> {
         }
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn stored_values(&self) -> usize {
         self.values.len()
     }

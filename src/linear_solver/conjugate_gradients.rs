@@ -289,6 +289,10 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         Ok(())
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn stored_values(&self) -> usize {
         [&self.values, &self.scaling, &self.vectors].iter().map(|part| part.len()).sum()
     }

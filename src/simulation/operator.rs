@@ -3,6 +3,7 @@
 //! - `matrix`, `tangent`: the entries of the effective matrix, and the motion at which its tangent is evaluated.
 //! - `contact_path`, `interface`: the order of elimination, and the dofs that contact acts on.
 //! - `responses`, `delassus`: responses of the interface to unit forces, and the Delassus operator of the rows.
+//! - `products`: contact problems solved without it.
 
 pub(super) mod contact_path;
 pub(super) mod interface;
@@ -11,9 +12,10 @@ pub(super) mod responses;
 pub(super) mod tangent;
 
 mod delassus;
+mod products;
 
 use crate::contact::{ContactJacobian, Groups, RowProducts};
-use crate::contact_solver::{FORESEEN, MANY};
+use crate::contact_solver::{Assembly, FORESEEN, MANY, Outcome, RowData};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::memory;
@@ -25,6 +27,7 @@ use crate::simulation::operator::responses::{Responses, Unit};
 use crate::simulation::operator::tangent::At;
 use crate::system::System;
 use delassus::Delassus;
+use products::Products;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -41,6 +44,8 @@ pub(crate) struct Operator<T> {
     /// Version of the rows that the Delassus operator belongs to.
     rows: u64,
     delassus: Delassus<T>,
+    /// Contact without W; none until it is used.
+    products: Option<Box<Products<T>>>,
     groups: Groups,
     contact: ContactPath,
     /// Whether this rank has all rows of the matrix.
@@ -95,6 +100,7 @@ impl<T: Real> Operator<T> {
             },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
+            products: None,
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact,
             whole: system.ranks().is_none(),
@@ -125,6 +131,7 @@ impl<T: Real> Operator<T> {
             diagonal: DiagonalResponses { reciprocals: Vec::new(), products: RowProducts::default() },
             rows: 0,
             delassus: Delassus::foreseen(interface.len()),
+            products: None,
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact: ContactPath::Condensed,
             whole: true,
@@ -327,39 +334,75 @@ impl<T: Real> Operator<T> {
         self.responses.respond((rows, multipliers), forces, response);
     }
 
-    /// Whether W of `rows` rows costs more to form than to apply: the factor changes with every iteration.
-    pub(crate) fn applies(&self, rows: usize) -> bool {
-        // The scale of W reads rows of the matrix, of which no rank has all.
-        self.varies() && rows >= MANY && self.contact != ContactPath::Apart && self.whole
+    /// Whether problems of so many rows may be solved by products with A.
+    pub(crate) fn multiplies(&self, assembly: Assembly, rows: usize) -> bool {
+        let enough = match assembly {
+            Assembly::Always => return false,
+            Assembly::Automatic => MANY,
+            Assembly::Never => 1,
+        };
+        rows >= enough && self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric()
     }
 
-    /// The magnitude of the diagonal of W, as if each dof moved with all other dofs held.
-    pub(crate) fn scale(&self, g: &ContactJacobian<T>, rows: &[usize], scale: &mut Vec<T>) {
-        let diagonal = |place: usize| self.matrix.diagonal(self.interface[place]);
-        scale.clear();
-        scale.extend(
-            rows.iter().map(|&row| g.located(row).map(|(place, weight)| weight * weight / diagonal(place)).sum::<T>()),
-        );
-    }
-
-    /// W λ of some rows by one solve; leaves the forces Gᵀ λ and their response in two vectors on the interface.
-    pub(crate) fn apply(
+    /// Solves a contact problem by products with A, unless forming W is less work or the only way. Leaves the forces
+    /// Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
+    pub(crate) fn solve_by_products(
         &mut self,
-        g: &ContactJacobian<T>,
-        (rows, multipliers): (&[usize], &[T]),
+        (system, h, at): (&mut dyn System<T>, f64, At<'_, T>),
+        assembly: Assembly,
+        (g, rows): (&ContactJacobian<T>, &[usize]),
+        data: RowData<'_, T>,
+        multipliers: &mut [T],
         [forces, response]: [&mut [T]; 2],
-        y: &mut [T],
-    ) -> Result<()> {
-        forces.fill(T::zero());
-        for (&row, &lambda) in rows.iter().zip(multipliers) {
-            g.interface_scatter(row, lambda, forces);
+    ) -> Result<Option<Outcome>> {
+        if data.compliance.iter().any(|c| !c.is_finite()) {
+            return Ok(None);
         }
-        response.copy_from_slice(forces);
-        self.respond(response)?;
-        for (y, &row) in y.iter_mut().zip(rows) {
-            *y = g.interface_product(row, response);
+        self.read_products(system, h, at)?;
+        let Some(products) = &mut self.products else { return Ok(None) };
+        if assembly == Assembly::Automatic {
+            let entries = rows.iter().map(|&row| g.located(row).count()).sum();
+            let with_w = self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
+            if products.work(entries) > with_w {
+                return Ok(None);
+            }
+        }
+        let outcome = products.solve((&self.matrix, system), (g, rows), data, multipliers);
+        if outcome.is_solved {
+            forces.fill(T::zero());
+            for (&row, &lambda) in rows.iter().zip(&*multipliers) {
+                g.interface_scatter(row, lambda, forces);
+            }
+            let solution = products.response();
+            for (response, &dof) in response.iter_mut().zip(&self.interface) {
+                *response = solution[dof];
+            }
+        }
+        Ok(Some(outcome))
+    }
+
+    /// Reads what products need of the present matrix.
+    fn read_products(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
+        if self.products.as_ref().is_some_and(|products| products.is_current) {
+            return Ok(());
+        }
+        if !self.varies() {
+            self.matrix.assemble(system, h, at)?;
+        }
+        let matrix = &self.matrix;
+        let products = self.products.get_or_insert_with(|| Box::new(Products::new(matrix, system)));
+        products.read(matrix, system, h)?;
+        if products.is_packed && !self.varies() {
+            self.matrix.free_values();
         }
         Ok(())
+    }
+
+    /// Another stage begins: contact problems solved so far are not near those to come.
+    pub(crate) fn begin_stage(&mut self) {
+        if let Some(products) = &mut self.products {
+            products.begin();
+        }
     }
 
     /// Forgets the Delassus operator if it belongs to another version of the rows.
@@ -373,6 +416,9 @@ impl<T: Real> Operator<T> {
 
     /// Forgets results computed with another matrix.
     fn reset(&mut self) {
+        if let Some(products) = &mut self.products {
+            products.is_current = false;
+        }
         self.responses.reset();
         self.diagonal.reciprocals.clear();
         self.delassus.version = 0;

@@ -4,8 +4,10 @@
 //! are read, with one index per block of them (`benches/solids.rs` measures the gain).
 
 use super::Symmetry;
-use crate::kernels::product::{LowerColumns, Supervariable, Tridiagonal};
+use crate::error::Result;
+use crate::kernels::product::{LowerColumns, LowerEntries, Supervariable, Tridiagonal};
 use crate::kernels::vector::Accumulate;
+use crate::memory;
 use crate::real::Real;
 use crate::threads;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -43,6 +45,27 @@ impl<T: Real> Product<T> {
         Supervariables::find(a.symbolic()).map_or(Self::Rows, Self::Supervariables)
     }
 
+    /// For all symmetric matrices of a pattern.
+    pub(crate) fn of_symmetric(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
+        Supervariables::find(pattern).map_or(Self::Rows, Self::Supervariables)
+    }
+
+    /// Packs the entries of a symmetric matrix that [`write_packed`](Self::write_packed) then reads. Returns whether
+    /// it does; other matrices are read in place.
+    pub(crate) fn pack(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<bool> {
+        match self {
+            Self::Supervariables(supervariables) => supervariables.pack(a).map(|()| true),
+            Self::General | Self::Rows | Self::Tridiagonal { .. } => Ok(false),
+        }
+    }
+
+    /// `y = A x` with the packed entries.
+    pub(crate) fn write_packed(&mut self, x: &[T], y: &mut [T]) {
+        if let Self::Supervariables(supervariables) = self {
+            supervariables.multiply(T::one(), None, x, y, Accumulate::Replace);
+        }
+    }
+
     pub(crate) fn symmetry(&self) -> Symmetry {
         match self {
             Self::General => Symmetry::General,
@@ -72,7 +95,7 @@ impl<T: Real> Product<T> {
             Self::Tridiagonal { diagonal, beside } => {
                 T::tridiagonal_product(c, Tridiagonal { diagonal, beside }, x, y, put);
             }
-            Self::Supervariables(supervariables) => supervariables.multiply(c, a, x, y, put),
+            Self::Supervariables(supervariables) => supervariables.multiply(c, Some(a), x, y, put),
         }
     }
 }
@@ -85,6 +108,8 @@ pub(crate) struct Supervariables<T> {
     all: Vec<Supervariable>,
     groups: Vec<u32>,
     parts: Vec<Part<T>>,
+    /// The entries at and below the diagonal, if they have been packed.
+    packed: Vec<T>,
 }
 
 /// Columns that one thread multiplies.
@@ -96,6 +121,8 @@ struct Part<T> {
     /// Their contributions to the product: in their own rows, then in later rows. Empty if there is a single part,
     /// which writes to the product itself.
     sums: Vec<T>,
+    /// Where its packed entries begin.
+    packed: usize,
 }
 
 impl<T: Real> Supervariables<T> {
@@ -140,7 +167,7 @@ impl<T: Real> Supervariables<T> {
         all.shrink_to_fit();
         groups.shrink_to_fit();
         let parts = Self::parts(pattern, &all);
-        Some(Self { all, groups, parts })
+        Some(Self { all, groups, parts, packed: Vec::new() })
     }
 
     /// Parts with similar numbers of entries; a single one if they would contribute to many rows of each other.
@@ -161,18 +188,47 @@ impl<T: Real> Supervariables<T> {
             let reach = columns.clone().filter_map(|j| pattern.row_idx_of_col_raw(j).last()).max();
             let rows = reach.map_or(columns.end, |row| columns.end.max(row + 1)) - columns.start;
             behind += rows - columns.len();
-            parts.push(Part { supervariables, columns, sums: vec![T::zero(); rows] });
+            parts.push(Part { supervariables, columns, sums: vec![T::zero(); rows], packed: 0 });
         }
         if parts.len() == 1 || behind > n {
-            return vec![Part { supervariables: 0..all.len() - 1, columns: 0..n, sums: Vec::new() }];
+            return vec![Part { supervariables: 0..all.len() - 1, columns: 0..n, sums: Vec::new(), packed: 0 }];
         }
         parts
     }
 
-    fn multiply(&mut self, c: T, a: SparseColMatRef<'_, usize, T>, x: &[T], y: &mut [T], put: Accumulate) {
-        let Self { all, groups, parts } = self;
+    /// Copies the entries of a matrix at and below the diagonal.
+    fn pack(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+        let Self { all, groups, parts, packed } = self;
+        let last = all.len() - 1;
+        let height = |at: usize| {
+            let groups = (all[at + 1].first - all[at].first) as usize;
+            (usize::from(all[at].width), all[at].entries(groups))
+        };
+        packed.clear();
+        memory::grow(packed, (0..last).map(|at| height(at).1).sum(), 1, "the packed effective matrix")?;
+        debug_assert!(groups.len() == all[last].first as usize);
+        let mut rest = &mut packed[..];
+        let mut begin = 0;
+        for at in 0..last {
+            if let Some(part) = parts.iter_mut().find(|part| part.supervariables.start == at) {
+                part.packed = begin;
+            }
+            let (width, entries) = height(at);
+            begin += entries;
+            for k in 0..width {
+                let (own, behind) = rest.split_at_mut(entries / width);
+                let end = a.col_ptr()[all[at].column as usize + k + 1];
+                own.copy_from_slice(&a.val()[end - own.len()..end]);
+                rest = behind;
+            }
+        }
+        Ok(())
+    }
+
+    fn multiply(&mut self, c: T, a: Option<SparseColMatRef<'_, usize, T>>, x: &[T], y: &mut [T], put: Accumulate) {
+        let Self { all, groups, parts, packed } = self;
         let lower = |part: &Part<T>| LowerColumns {
-            matrix: a,
+            entries: a.map_or(LowerEntries::Packed(packed.get(part.packed..).unwrap_or(&[])), LowerEntries::Matrix),
             supervariables: &all[part.supervariables.start..=part.supervariables.end],
             groups,
         };
@@ -241,6 +297,13 @@ mod tests {
         let before: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).sin()).collect();
         let (mut written, mut added) = (vec![f64::NAN; n], before.clone());
         product.write(-2.0, a, &x, &mut written);
+        let mut packed = vec![f64::NAN; n];
+        if product.pack(a).unwrap() {
+            product.write_packed(&x, &mut packed);
+            assert!(
+                packed.iter().zip(&written).all(|(packed, written)| (-2.0 * packed - written).abs() < 1e-14 * n as f64)
+            );
+        }
         product.add(-2.0, a, &x, &mut added);
         for j in 0..n {
             let terms = || a.row_idx_of_col_raw(j).iter().zip(a.val_of_col(j)).map(|(&i, &value)| value * x[i]);

@@ -4,3 +4,4 @@ mod friction;
 mod many_rows;
 mod solvers;
 mod squeezes;
+mod without_w;

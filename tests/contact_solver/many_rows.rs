@@ -1,7 +1,7 @@
 //! Hundreds of rows that press together: solved by iteration where they are independent, and as exactly as few.
 
 use contact_dynamics::Real;
-use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, AppliedProblem, ContactProblem, ContactSolver};
+use contact_dynamics::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver};
 use contact_dynamics_scenes::random::Congruential;
 
 /// The flexibility of nodes on a square grid, in units that differ by decades: falls off with their distance.
@@ -49,20 +49,6 @@ fn check<T: Real>(side: usize, exact: f64) {
         let unit = w[i * n + i].sqrt();
         let miss: f64 = ((cold[i] - multipliers[i]) * unit).abs().value();
         assert!(miss < exact, "{n} rows, row {i}: {miss:e}");
-    }
-    // By products alone.
-    let scale: Vec<T> = (0..n).map(|i| w[i * n + i]).collect();
-    let mut product = |x: &[T], y: &mut [T]| {
-        for (y, row) in y.iter_mut().zip(w.chunks_exact(n)) {
-            *y = row.iter().zip(x).map(|(&w, &x)| w * x).sum();
-        }
-    };
-    let mut applied = vec![T::zero(); n];
-    let mut by_products = AppliedProblem::new(&mut product, &scale, &offset, &sets, &tolerance).unwrap();
-    ActiveSet::default().solve_applied(&mut by_products, &mut applied).unwrap().unwrap();
-    for i in 0..n {
-        let miss = ((applied[i] - multipliers[i]) * scale[i].sqrt()).abs().value();
-        assert!(miss < exact, "{n} rows by products, row {i}: {miss:e}");
     }
     // What is kept from the last problem, or guessed, changes nothing.
     let mut kept = cold.clone();

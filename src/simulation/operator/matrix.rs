@@ -61,6 +61,11 @@ impl<T: Real> EffectiveMatrix<T> {
         self.tangent == Tangent::Present && self.linearity == Linearity::Nonlinear
     }
 
+    /// The factor of M.
+    pub(crate) fn inertia(&self, h: f64) -> f64 {
+        self.weights[2] / (h * h)
+    }
+
     pub(crate) fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
         self.combination.pattern()
     }
@@ -75,14 +80,6 @@ impl<T: Real> EffectiveMatrix<T> {
     /// Frees the values after the factorization of a matrix that does not change.
     pub(crate) fn free_values(&mut self) {
         self.values = Vec::new();
-    }
-
-    /// A diagonal entry of a matrix whose values are kept; zero if it has none.
-    pub(crate) fn diagonal(&self, dof: usize) -> T {
-        let pattern = self.combination.pattern();
-        let range = pattern.col_range(dof);
-        let at = pattern.row_idx()[range.clone()].binary_search(&dof);
-        at.map_or(T::zero(), |at| self.values[range.start + at])
     }
 
     /// Forms the matrix for the step size h with the tangent at a motion. Where it varies, only the first call

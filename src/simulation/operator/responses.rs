@@ -177,6 +177,18 @@ impl<T: Real> Responses<T> {
         (first, &self.pages[page][start..start + count])
     }
 
+    /// Work to form W of so many rows with so many entries anew, unless they stay the same, and to solve with it.
+    pub(crate) fn work(&self, (rows, entries): (usize, usize), has_friction: bool) -> f64 {
+        let (rows, entries, size) = (rows as f64, entries as f64, self.size as f64);
+        let forms = match self.unit {
+            Unit::Row => 0.0,
+            Unit::Dof => entries * (size + rows),
+        };
+        // Friction factorizes a matrix twice; otherwise iterations take products with W.
+        let solves = if has_friction { rows * rows * rows / 4.0 } else { 20.0 * rows * rows };
+        8.0 * forms + solves
+    }
+
     /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): the rounding of its entries then
     /// depends on the set of rows.
     pub(crate) fn couples_by_tiles(&self, g: &ContactJacobian<T>, rows: &[usize]) -> bool {

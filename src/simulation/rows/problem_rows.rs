@@ -13,9 +13,8 @@ pub(crate) struct ProblemRows<T> {
     pub(crate) tolerance: Vec<T>,
     pub(crate) sets: Vec<AdmissibleSet>,
     pub(crate) multipliers: Vec<T>,
-    /// Compliances of the rows, and magnitude of the diagonal of W, if W is applied and not formed.
+    /// Compliances of the rows, if W is not formed.
     pub(crate) own: Vec<T>,
-    pub(crate) scale: Vec<T>,
     pub(crate) known: KnownForces<T>,
     /// Number of rows for which the contact solver has reserved memory.
     pub(crate) reserved: usize,
@@ -36,7 +35,6 @@ impl<T: Real> ProblemRows<T> {
             sets: Vec::new(),
             multipliers: Vec::new(),
             own: Vec::new(),
-            scale: Vec::new(),
             known: KnownForces { delassus: Vec::new(), offset: Vec::new() },
             reserved: rows.min(FORESEEN),
             checked: FORESEEN,

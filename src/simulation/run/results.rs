@@ -19,8 +19,11 @@ pub struct Statistics {
     pub factorizations: u64,
     /// Contact problems solved; a stage without near contacts has none.
     pub contact_solves: u64,
-    /// Active-set iterations of all contact problems together.
+    /// Active-set iterations of all contact problems together, of those with W.
     pub contact_iterations: u64,
+    /// Products with the effective matrix for contact problems without W
+    /// ([`Assembly`](crate::contact_solver::Assembly)).
+    pub contact_products: u64,
     /// Contacts that closed or opened, counted at the end of each step.
     pub contact_changes: u64,
     /// Steps that failed or were judged too coarse, and were taken again with half the size.

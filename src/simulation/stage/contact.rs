@@ -6,11 +6,10 @@
 //! - `target`: where contact is imposed, and which rows may carry a force there.
 //! - `solve`: solves the contact problem, and solves it again with rows linearized at its result.
 //! - `laws`: gaps and rates of compliant laws, restitution.
-//! - `multipliers`, `applied_rows`: the multipliers of the rows in the problem.
+//! - `multipliers`: the multipliers of the rows in the problem.
 //! - `curved`: rows that turn within the stage.
 //! - `closing`: which contacts are closed at the end, their forces and impulses.
 
-pub(in crate::simulation) mod applied_rows;
 pub(in crate::simulation) mod closing;
 pub(in crate::simulation) mod curved;
 pub(in crate::simulation) mod laws;

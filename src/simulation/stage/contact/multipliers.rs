@@ -1,19 +1,19 @@
 //! The multipliers of the contact problem of a stage.
 
 use crate::contact::{ContactJacobian, Course};
-use crate::contact_solver::{ContactFailure, ContactProblem};
+use crate::contact_solver::{Assembly, ContactFailure, ContactProblem, Outcome, RowData};
 use crate::corrector::{Gaps, contact_error};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
-use crate::rounding::{half_digits, rounding};
+use crate::rounding::{half_digits, projected_residual, rounding};
 use crate::simulation::operator::interface::InterfaceWork;
+use crate::simulation::operator::tangent::{At, TangentOf};
 use crate::simulation::rows::contact_rows::ContactRowsWork;
 use crate::simulation::rows::contact_rows::RowState;
 use crate::simulation::rows::problem_rows::ProblemRows;
 use crate::simulation::stage::StageSolve;
 use crate::simulation::stage::contact::ContactWork;
-use crate::simulation::stage::contact::applied_rows::AppliedRows;
 use crate::simulation::stage::contact::laws::{course, slows};
 
 /// Maximum number of linearizations of nonlinear laws in a stage.
@@ -107,11 +107,10 @@ impl<T: Real> StageSolve<'_, '_, T> {
     fn solve_linear_laws(&mut self) -> Result<()> {
         loop {
             self.contact.rows.list_problem(self.constraints, self.g, self.operator);
-            let iterations = match self.solve_by_products()? {
-                Some(iterations) => iterations,
-                None => self.solve_by_delassus()?,
-            };
-            self.statistics.contact_iterations += iterations as u64;
+            match self.solve_by_products()? {
+                Some(products) => self.statistics.contact_products += products as u64,
+                None => self.statistics.contact_iterations += self.solve_by_delassus()? as u64,
+            }
             self.statistics.contact_solves += 1;
             if !self.add_violated_rows() {
                 return Ok(());
@@ -127,27 +126,41 @@ impl<T: Real> StageSolve<'_, '_, T> {
         multipliers.extend(rows.iter().map(|&row| trial.lambda_raw[row]));
     }
 
-    /// Solves a problem of many rows by products with W, if it costs less than forming W and the solver can. Returns
-    /// its iterations.
+    /// Solves a problem by products with A, if that is less work than forming W and the solver leaves the choice.
+    /// Returns the number of products.
     fn solve_by_products(&mut self) -> Result<Option<usize>> {
-        if !self.operator.applies(self.contact.rows.problem.rows.len()) || !self.constraints.tangents().is_empty() {
+        let assembly = self.solver.assembly();
+        if !self.operator.multiplies(assembly, self.contact.rows.problem.rows.len()) {
             return Ok(None);
         }
         self.guess_multipliers();
-        let Self { g, operator, solver, contact, .. } = self;
+        let Self { stage, clock, host, new, g, operator, contact, .. } = self;
         let ContactWork { rows, interface, .. } = &mut **contact;
         let ContactRowsWork { laws, weight, curved, problem, .. } = rows;
-        let ProblemRows { rows, own, offset, sets, tolerance, scale, multipliers, .. } = problem;
+        let ProblemRows { rows, own, offset, sets, tolerance, multipliers, .. } = problem;
         own.clear();
+        // A row with a known force has no weight, and with this no finite compliance.
         own.extend(rows.iter().map(|&row| laws.compliance[row] / weight[row]));
+        let at = At { t: clock.at(stage.load), u: &new.u, v: &new.v, of: TangentOf::State };
         let InterfaceWork { problem_forces, response, .. } = interface;
-        AppliedRows { g: curved.forces(g), rows, own, offset, sets, tolerance }.solve(
-            operator,
-            &mut **solver,
-            [problem_forces, response],
-            scale,
+        let solved = operator.solve_by_products(
+            (&mut *host.system, clock.h, at),
+            assembly,
+            (curved.forces(g), rows),
+            RowData { compliance: own, offset, tolerance, sets, along: &[] },
             multipliers,
-        )
+            [problem_forces, response],
+        )?;
+        match solved {
+            Some(Outcome { products, is_solved: true, .. }) => Ok(Some(products)),
+            Some(Outcome { products, residual, .. }) if assembly == Assembly::Never => Err(Error::LinearNotConverged {
+                method: "projected conjugate gradients for contact",
+                iterations: products,
+                residual,
+                tolerance: projected_residual::<T>().value(),
+            }),
+            _ => Ok(None),
+        }
     }
 
     /// Solves the problem with W formed, group by group. Returns the most iterations of a group.

@@ -12,6 +12,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     /// Finds the multipliers of the stage from d on the interface, adds their response to d, and leaves their forces
     /// in `interface.forces`. Motions are left as predicted. Returns whether curved rows fit the resulting d.
     pub(crate) fn solve_contact(&mut self) -> Result<bool> {
+        self.operator.begin_stage();
         self.keep_motion();
         let result = self.predict_target().and_then(|()| self.iterate_contact());
         self.restore_motion();

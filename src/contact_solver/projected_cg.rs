@@ -1,0 +1,268 @@
+//! Contact problems without W: conjugate gradients for the displacements, projected onto the closed rows.
+//!
+//! Forming W = G A⁻¹ Gᵀ takes a response for every row, and solving with it a dense matrix. This method takes products
+//! with A instead, as many as a system without contact would take: all its directions keep the closed rows closed,
+//! because residuals are projected with the diagonal D of A in the place of A (a constraint preconditioner: Gould,
+//! Hribar and Nocedal, SIAM J. Sci. Comput. 23, 2001). The only matrix of contacts is N = G D⁻¹ Gᵀ, which is sparse.
+//!
+//! In the order of execution:
+//!
+//! - `rows`: the rows of the problem, with tangents turned along the slip.
+//! - `metric`: N and its factor, projections.
+//! - `statuses`: which rows are closed, stick or slide.
+
+mod metric;
+mod rows;
+mod statuses;
+
+use super::AdmissibleSet;
+use crate::contact::ContactJacobian;
+use crate::dense::dot;
+use crate::real::Real;
+use crate::rounding::projected_residual;
+use metric::Metric;
+use rows::Rows;
+use statuses::{Change, Statuses};
+
+/// Writes A x to its second argument, with x its first.
+type Product<'a, T> = &'a mut dyn FnMut(&[T], &mut [T]);
+
+/// A contact problem given by A and G: y = G x + c λ + q with A x = Gᵀ λ.
+pub(crate) struct SparseProblem<'a, T> {
+    /// A is symmetric and positive definite.
+    pub(crate) product: Product<'a, T>,
+    /// D⁻¹ by dof: one over the diagonal of A, zero for dofs that do not move.
+    pub(crate) inverse: &'a [T],
+    /// G, of which the problem has these rows, block after block.
+    pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) rows: &'a [usize],
+    pub(crate) data: RowData<'a, T>,
+    pub(crate) patience: Patience,
+}
+
+/// When an iteration gives up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patience {
+    /// Products with A.
+    pub(crate) products: usize,
+    /// How often statuses may be decided.
+    pub(crate) looks: usize,
+}
+
+/// c, q and the rounding of y of each row, and the set of each block.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowData<'a, T> {
+    pub(crate) compliance: &'a [T],
+    pub(crate) offset: &'a [T],
+    pub(crate) tolerance: &'a [T],
+    pub(crate) sets: &'a [AdmissibleSet],
+    /// For each block its friction per unit normal force, if that is given. Empty if none is.
+    pub(crate) along: &'a [Option<[T; 2]>],
+}
+
+/// What an iteration has spent and left.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outcome {
+    /// Products with A.
+    pub(crate) products: usize,
+    /// The residual of the balance, relative to the contact forces, both in the norm of D⁻¹.
+    pub(crate) residual: f64,
+    pub(crate) is_solved: bool,
+}
+
+/// The method, with its memory. Between two problems of one stage it keeps x and N: the second problem differs little.
+#[derive(Debug, Default)]
+pub(crate) struct ProjectedCg<T> {
+    rows: Rows<T>,
+    metric: Metric<T>,
+    statuses: Statuses<T>,
+    /// D⁻¹ by dof, then for each row its compliance: a compliant row has a displacement of its own, σ = c λ.
+    inverse: Vec<T>,
+    x: Vec<T>,
+    /// Gᵀ λ − A x.
+    residual: Vec<T>,
+    direction: Vec<T>,
+    product: Vec<T>,
+    is_begun: bool,
+}
+
+/// The decrease of the residual after which the statuses of the rows are looked at again.
+const LOOK: f64 = 0.1;
+
+impl<T: Real> ProjectedCg<T> {
+    /// Forgets the last problem: the next one is of another stage or has another A.
+    pub(crate) fn begin(&mut self) {
+        self.is_begun = false;
+    }
+
+    /// x of the last problem, by dof.
+    pub(crate) fn solution(&self) -> &[T] {
+        &self.x[..self.x.len() - self.rows.len()]
+    }
+
+    /// Solves for the multipliers, which contain a guess of the closed rows without friction.
+    pub(crate) fn solve(&mut self, problem: &mut SparseProblem<'_, T>, multipliers: &mut [T]) -> Outcome {
+        let mut outcome = Outcome { products: 0, residual: f64::NAN, is_solved: false };
+        let limit = problem.patience.products;
+        self.take(problem, multipliers);
+        let mut scale = T::zero();
+        while outcome.products < limit && self.statuses.looks < problem.patience.looks {
+            self.set_compliances();
+            if !self.metric.follow(&self.rows, &self.statuses, &self.inverse) {
+                break;
+            }
+            let miss = self.metric.close(&self.rows, &self.statuses, &self.inverse, &mut self.x);
+            if !miss.is_met() && self.metric.is_near {
+                self.metric.forget();
+                continue;
+            }
+            if !miss.is_met() {
+                outcome.residual = miss.share();
+                break;
+            }
+            self.balance(problem);
+            outcome.products += 1;
+            let (mut last, mut looked) = (None, None);
+            loop {
+                scale = scale.max(self.metric.square(&self.statuses.multipliers).max(T::zero()).sqrt());
+                let goal = projected_residual::<T>() * scale;
+                let square = self.square();
+                if !square.is_finite() {
+                    return outcome;
+                }
+                let left = square.sqrt();
+                outcome.residual = ratio(left, scale);
+                let is_balanced = left <= goal;
+                if is_balanced || left <= T::of(LOOK) * *looked.get_or_insert(left) {
+                    looked = Some(left);
+                    let change = self.statuses.update(&mut self.rows, &mut self.x, &mut self.metric);
+                    if change == Change::Some {
+                        break;
+                    }
+                    if is_balanced {
+                        outcome.is_solved = true;
+                        self.rows.read(&self.statuses.multipliers, multipliers);
+                        self.is_begun = true;
+                        return outcome;
+                    }
+                }
+                if outcome.products == limit || !self.descend(problem, square, &mut last) {
+                    return outcome;
+                }
+                outcome.products += 1;
+            }
+        }
+        outcome
+    }
+
+    /// Takes the rows of a problem. Those of the last one, linearized elsewhere, go on from its solution.
+    fn take(&mut self, problem: &SparseProblem<'_, T>, guess: &[T]) {
+        let keeps = self.is_begun && self.rows.are_of(problem);
+        self.is_begun = false;
+        let (dofs, size) = (problem.inverse.len(), problem.inverse.len() + problem.rows.len());
+        let same = self.rows.take(problem, keeps);
+        if keeps {
+            self.statuses.keep(&self.rows);
+            self.metric.keep();
+        } else {
+            self.statuses.begin(&self.rows, guess);
+            self.x.clear();
+            self.x.resize(size, T::zero());
+            // A factor of exactly this N may stay: it changes no bit of the result.
+            match same && self.inverse.get(..dofs) == Some(problem.inverse) {
+                true => self.metric.begin(&self.statuses),
+                false => self.metric.forget(),
+            }
+            self.inverse.clear();
+            self.inverse.extend_from_slice(problem.inverse);
+        }
+        for values in [&mut self.residual, &mut self.direction, &mut self.product] {
+            values.resize(size, T::zero());
+        }
+    }
+
+    /// D⁻¹ of the displacements of compliant rows is their compliance.
+    fn set_compliances(&mut self) {
+        let dofs = self.x.len() - self.rows.len();
+        self.inverse.truncate(dofs);
+        self.inverse.extend_from_slice(&self.statuses.compliance);
+    }
+
+    /// Evaluates the residual Gᵀλ − A x, and projects it.
+    fn balance(&mut self, problem: &mut SparseProblem<'_, T>) {
+        self.multiply(problem, Operand::Solution);
+        let Self { rows, metric, statuses, inverse, residual, product, .. } = self;
+        for (r, &product) in residual.iter_mut().zip(&*product) {
+            *r = -product;
+        }
+        let dofs = problem.inverse.len();
+        for row in 0..rows.len() {
+            let lambda = statuses.multipliers[row];
+            if lambda != T::zero() {
+                rows.scatter(row, lambda, residual);
+                if inverse[dofs + row] > T::zero() {
+                    residual[dofs + row] += lambda;
+                }
+            }
+        }
+        let size = weighted(residual, inverse).sqrt();
+        metric.project(rows, statuses, inverse, (residual, size));
+    }
+
+    /// `product = A x` of the solution or the direction. A compliant row has the stiffness 1/c.
+    fn multiply(&mut self, problem: &mut SparseProblem<'_, T>, operand: Operand) {
+        let dofs = problem.inverse.len();
+        let Self { inverse, x, direction, product, .. } = self;
+        let x = match operand {
+            Operand::Solution => x,
+            Operand::Direction => direction,
+        };
+        (problem.product)(&x[..dofs], &mut product[..dofs]);
+        for ((product, &x), &c) in product[dofs..].iter_mut().zip(&x[dofs..]).zip(&inverse[dofs..]) {
+            *product = if c > T::zero() { x / c } else { T::zero() };
+        }
+    }
+
+    /// The square of the residual in the norm of D⁻¹.
+    fn square(&self) -> T {
+        weighted(&self.residual, &self.inverse)
+    }
+
+    /// One step of conjugate gradients; `last` is the square of the residual in the last step. Returns whether the
+    /// curvature is positive.
+    fn descend(&mut self, problem: &mut SparseProblem<'_, T>, square: T, last: &mut Option<T>) -> bool {
+        let share = last.map_or(T::zero(), |last| square / last);
+        *last = Some(square);
+        for ((p, &r), &inverse) in self.direction.iter_mut().zip(&self.residual).zip(&self.inverse) {
+            *p = inverse * r + if share > T::zero() { share * *p } else { T::zero() };
+        }
+        self.multiply(problem, Operand::Direction);
+        let Self { rows, metric, statuses, inverse, x, residual, direction, product, .. } = self;
+        let curvature = dot(direction, product);
+        let sound = curvature > T::zero();
+        if sound {
+            let length = square / curvature;
+            T::axpy(length, direction, x);
+            T::axpy(-length, product, residual);
+            metric.project(rows, statuses, inverse, (residual, square.sqrt()));
+        }
+        sound
+    }
+}
+
+/// What is multiplied with A.
+#[derive(Clone, Copy)]
+enum Operand {
+    Solution,
+    Direction,
+}
+
+/// rᵀ D⁻¹ r.
+fn weighted<T: Real>(r: &[T], inverse: &[T]) -> T {
+    r.iter().zip(inverse).map(|(&r, &inverse)| inverse * r * r).sum()
+}
+
+/// A ratio of sizes; zero if there is nothing to compare with.
+fn ratio<T: Real>(x: T, y: T) -> f64 {
+    if y > T::zero() { (x / y).value() } else { x.value() }
+}

@@ -1,0 +1,111 @@
+//! Contact problems solved by products with the effective matrix, without W.
+
+use crate::contact::ContactJacobian;
+use crate::contact_solver::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
+use crate::error::Result;
+use crate::mass::Mass;
+use crate::real::Real;
+use crate::rounding::projected_residual;
+use crate::simulation::operator::matrix::EffectiveMatrix;
+use crate::sparse::Product;
+use crate::system::System;
+
+/// What products need of an effective matrix.
+#[derive(Debug)]
+pub(super) struct Products<T> {
+    product: Product<T>,
+    /// Whether it has the entries of the matrix, packed.
+    pub(super) is_packed: bool,
+    /// Number of entries at and below the diagonal.
+    entries: usize,
+    /// D⁻¹, zero on prescribed dofs.
+    inverse: Vec<T>,
+    /// Products that a system without contact would take.
+    expected: usize,
+    cg: ProjectedCg<T>,
+    /// Whether all this belongs to the present matrix.
+    pub(super) is_current: bool,
+}
+
+/// How often statuses may be decided, and how many products may be taken over those expected, before W is formed.
+const LOOKS: usize = 40;
+const PATIENCE: usize = 3;
+
+impl<T: Real> Products<T> {
+    pub(super) fn new(matrix: &EffectiveMatrix<T>, system: &dyn System<T>) -> Self {
+        let product = Product::of_symmetric(matrix.view(system).symbolic());
+        Self {
+            product,
+            is_packed: false,
+            entries: 0,
+            inverse: Vec::new(),
+            expected: 0,
+            cg: ProjectedCg::default(),
+            is_current: false,
+        }
+    }
+
+    /// Reads a matrix.
+    pub(super) fn read(&mut self, matrix: &EffectiveMatrix<T>, system: &dyn System<T>, h: f64) -> Result<()> {
+        let a = matrix.view(system);
+        self.is_packed = self.product.pack(a)?;
+        self.entries = a.val().len().midpoint(a.ncols());
+        let (mut whole, mut mass) = (0.0, 0.0);
+        self.inverse.clear();
+        self.inverse.extend((0..a.ncols()).map(|dof| {
+            let at = a.row_idx_of_col_raw(dof).binary_search(&dof).ok();
+            let (Some(at), Err(_)) = (at, system.prescribed().binary_search(&dof)) else { return T::zero() };
+            let own = a.val_of_col(dof)[at];
+            whole += own.value();
+            mass += match system.mass() {
+                Mass::Lumped(mass) => mass[dof].value(),
+                Mass::Consistent(mass) => mass.val_of_col(dof).iter().map(|m| m.value()).sum(),
+            };
+            own.recip()
+        }));
+        // A smooth motion has the mass of the diagonal without its stiffness; the stiffest motion has twice both.
+        let condition = (2.0 * whole / (matrix.inertia(h) * mass)).max(1.0);
+        let digits = (2.0 / projected_residual::<T>().value()).ln();
+        let wanted = 0.5 * condition.sqrt() * digits;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
+        let count = wanted.ceil() as usize;
+        self.expected = if wanted.is_finite() { count } else { usize::MAX };
+        self.is_current = true;
+        self.cg.begin();
+        Ok(())
+    }
+
+    /// Work of a solution for rows with so many entries, in multiplications.
+    pub(super) fn work(&self, entries: usize) -> f64 {
+        self.expected as f64 * (self.entries + 8 * self.inverse.len() + 8 * entries) as f64
+    }
+
+    /// Another stage begins.
+    pub(super) fn begin(&mut self) {
+        self.cg.begin();
+    }
+
+    /// Solves for the multipliers of some rows.
+    pub(super) fn solve(
+        &mut self,
+        (matrix, system): (&EffectiveMatrix<T>, &dyn System<T>),
+        (g, rows): (&ContactJacobian<T>, &[usize]),
+        data: RowData<'_, T>,
+        multipliers: &mut [T],
+    ) -> Outcome {
+        let Self { product, is_packed, inverse, expected, cg, .. } = self;
+        let mut multiply = |x: &[T], y: &mut [T]| match *is_packed {
+            true => product.write_packed(x, y),
+            false => product.write(T::one(), matrix.view(system), x, y),
+        };
+        let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS);
+        let patience = Patience { products, looks: LOOKS };
+        let mut problem = SparseProblem { product: &mut multiply, inverse, g, rows, data, patience };
+        cg.solve(&mut problem, multipliers)
+    }
+
+    /// The response A⁻¹ Gᵀ λ of the last problem, by dof.
+    pub(super) fn response(&self) -> &[T] {
+        self.cg.solution()
+    }
+}

@@ -1,0 +1,180 @@
+//! Contact without the Delassus operator: the same motion and forces as with it, in every kind of problem that it
+//! serves, and an error where it does not end.
+
+use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Obstacle, Plane, Side, Sphere};
+use contact_dynamics::contact_solver::Assembly;
+use contact_dynamics::{
+    ActiveSet, Composite, ContactStatus, Error, GeneralizedAlpha, LinearRows, LinearSystem, PersistencyCorrection,
+    Simulation, System, TimeIntegrator,
+};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::stacks::Stack;
+
+const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+
+type Scheme = fn() -> Box<dyn TimeIntegrator>;
+const SCHEMES: [Scheme; 2] = [|| Box::new(GeneralizedAlpha::default()), || Box::new(Composite)];
+
+/// Runs a scene of elements of a size with W and without it, at a Courant number of 1, and compares all states. Returns
+/// how many contacts closed at most, and slid.
+fn compare<S: System<f64> + 'static>(
+    what: &str,
+    (size, steps): (f64, usize),
+    velocity: &[f64],
+    system: impl Fn() -> S,
+    contact: impl Fn() -> Box<dyn ContactConstraint<f64>>,
+) -> [usize; 2] {
+    let mut most = [0; 2];
+    for scheme in SCHEMES {
+        let [mut with_w, mut without] = [Assembly::Always, Assembly::Never].map(|assembly| {
+            Simulation::builder(system(), scheme(), size / MATERIAL.wave_speed())
+                .velocity(velocity.to_vec())
+                .constraint(contact())
+                .contact_solver(Box::new(ActiveSet::default().with_assembly(assembly)))
+                .corrector(PersistencyCorrection::with_history_projection())
+                .build()
+                .unwrap()
+        });
+        for step in 0..steps {
+            with_w.step().unwrap();
+            without.step().unwrap_or_else(|error| panic!("{what}, {}, step {step}: {error}", scheme().name()));
+            let [one, other] = [&with_w, &without].map(|run| run.state());
+            let name = format!("{what}, {}, step {step}", scheme().name());
+            near(&name, one.displacement(), other.displacement(), 1e-8);
+            near(&name, &one.velocity(), &other.velocity(), 1e-8);
+            // Rows that turn are linearized until forces agree to 1e-7.
+            near(&name, one.contacts().forces(), other.contacts().forces(), 1e-7);
+            let closed = one.contacts().closed();
+            let sliding = |&contact: &usize| one.contacts().status(contact) == ContactStatus::Sliding;
+            most[0] = most[0].max(closed.iter().filter(|closed| **closed).count());
+            most[1] = most[1].max((0..closed.len()).filter(sliding).count());
+        }
+        let [one, other] = [&with_w, &without].map(|run| *run.statistics());
+        assert!(one.contact_products == 0 && one.contact_iterations > 0, "{what}: {one:?}");
+        assert!(other.contact_products > 0 && other.contact_iterations == 0, "{what}: {other:?}");
+    }
+    most
+}
+
+/// Vectors that differ by a share of the largest entry at most.
+fn near(what: &str, one: &[f64], other: &[f64], share: f64) {
+    let size = one.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    for (k, (x, y)) in one.iter().zip(other).enumerate() {
+        assert!((x - y).abs() <= share * size, "{what}, entry {k}: {x:e} and {y:e} of {size:e}");
+    }
+}
+
+/// The size of the elements.
+const SIZE: f64 = 0.2;
+
+fn block() -> Solid<3> {
+    Solid::block([1.0, 1.0, 0.4], [5, 5, 2], MATERIAL)
+}
+
+/// The lower side of the block on an obstacle.
+fn on(
+    solid: &Solid<3>,
+    obstacle: impl Obstacle<f64, 3> + 'static,
+    law: ContactLaw,
+    friction: f64,
+) -> Box<dyn ContactConstraint<f64>> {
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
+    let nodes = NodesOnObstacle::new(obstacle, &solid.nodes, &solid.node_dofs(), &bottom).unwrap();
+    Box::new(nodes.with_law(law).friction(friction))
+}
+
+#[test]
+fn a_block_on_a_sphere_sticks_and_slides() {
+    let solid = block();
+    let velocity = solid.uniform([0.1, 0.04, -0.1]);
+    for friction in [0.0, 0.2, 2.0] {
+        let sphere = || Sphere::new([0.5, 0.5, -4.0], 3.98, Side::Outside).unwrap();
+        let contact = || on(&solid, sphere(), ContactLaw::Rigid, friction);
+        let [closed, slid] = compare(&format!("sphere, {friction}"), (SIZE, 12), &velocity, || solid.system(), contact);
+        assert!(closed > 8, "{closed}");
+        assert!(friction != 0.2 || slid > 3, "{slid}");
+    }
+}
+
+#[test]
+fn compliant_and_nonlinear_laws_and_a_consistent_mass() {
+    let solid = block();
+    let velocity = solid.uniform([0.03, 0.0, -0.1]);
+    let plane = || Plane::new([0.0, 0.0, -0.01], [0.1, 0.0, 1.0]).unwrap();
+    for law in [ContactLaw::Penalty { stiffness: 0.1 }, ContactLaw::Rigid] {
+        let system = || LinearSystem::new(solid.consistent_mass(), solid.stiffness()).unwrap();
+        let contact = || on(&solid, plane(), law, 0.0);
+        let [closed, _] = compare(&format!("plane, {law:?}"), (SIZE, 10), &velocity, system, contact);
+        assert!(closed > 8, "{closed}");
+    }
+}
+
+#[test]
+fn blocks_of_other_meshes_stick_and_slide() {
+    let bodies = [4, 5].map(|n| Solid::block([1.0; 3], [n, n, 2], MATERIAL));
+    let stack = Stack::new(bodies, 0.002, |x| x);
+    let velocity = stack.velocity_of_upper([0.05, 0.02, -0.1]);
+    for friction in [0.0, 0.2, 2.0] {
+        let contact =
+            || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.mortar(true).unwrap().friction(friction)) };
+        let [closed, slid] =
+            compare(&format!("mortar, {friction}"), (SIZE, 12), &velocity, || stack.solid.system(), contact);
+        assert!(closed > 8, "{closed}");
+        assert!(friction != 0.2 || slid > 3, "{slid}");
+    }
+    let contact = || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.nodes_on_facets(1).unwrap()) };
+    compare("nodes on facets", (SIZE, 12), &velocity, || stack.solid.system(), contact);
+}
+
+#[test]
+fn in_the_plane() {
+    let bodies = [5, 6].map(|n| Solid::rectangle([1.0; 2], [n, 4], MATERIAL));
+    let stack = Stack::new(bodies, 0.002, |x| x);
+    let velocity = stack.velocity_of_upper([0.05, -0.1]);
+    let contact = || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.mortar(true).unwrap().friction(0.2)) };
+    let [closed, slid] = compare("plane", (SIZE, 12), &velocity, || stack.solid.system(), contact);
+    assert!(closed > 4 && slid > 1, "{closed} {slid}");
+}
+
+#[test]
+fn iterations_of_a_nonlinear_system() {
+    let solid = block();
+    let velocity = solid.uniform([0.02, 0.0, -0.1]);
+    let system = || Hyperelastic::new(&solid, Law::StVenantKirchhoff);
+    let contact = || on(&solid, Sphere::new([0.5, 0.5, -4.0], 3.98, Side::Outside).unwrap(), ContactLaw::Rigid, 0.3);
+    let [closed, _] = compare("hyperelastic", (SIZE, 10), &velocity, system, contact);
+    assert!(closed > 8, "{closed}");
+}
+
+/// Hundreds of rows of a mortar: also the jumps are removed without a dense S.
+#[test]
+fn jumps_of_hundreds_of_rows() {
+    let bodies = [10, 11].map(|n| Solid::block([1.0; 3], [n, n, 1], MATERIAL));
+    let stack = Stack::new(bodies, 0.0, |x| x);
+    let velocity = stack.velocity_of_upper([0.05, 0.02, -0.1]);
+    for friction in [0.0, 0.3] {
+        let contact =
+            || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.mortar(true).unwrap().friction(friction)) };
+        let [closed, _] =
+            compare(&format!("mortar, {friction}"), (0.1, 3), &velocity, || stack.solid.system(), contact);
+        assert!(closed > 100, "{closed}");
+    }
+}
+
+/// Two equations that contradict each other have no solution, and the error names what is left of them.
+#[test]
+fn what_cannot_be_closed_is_refused() {
+    let solid = block();
+    let rows = || LinearRows::new().equality(&[(2, 1.0)], 0.0).equality(&[(2, 1.0)], -0.1);
+    let mut run = Simulation::builder(solid.system::<f64>(), GeneralizedAlpha::default(), 1.0)
+        .constraint(rows())
+        .contact_solver(Box::new(ActiveSet::default().with_assembly(Assembly::Never)))
+        .build();
+    let error = match &mut run {
+        Ok(run) => run.step().unwrap_err(),
+        Err(_) => return,
+    };
+    let refused = matches!(error, Error::LinearNotConverged { residual, .. } if residual > 1e-3);
+    assert!(refused, "{error}");
+}
