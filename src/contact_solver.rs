@@ -37,6 +37,26 @@ pub(crate) const MANY: usize = 256;
 /// Without W the problem is solved by projected conjugate gradients (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23,
 /// 2001) on the displacements: products with A, as many as for a system without contact. Forces are the same to eleven
 /// digits.
+///
+/// ```
+/// use contact_dynamics::ActiveSet;
+/// use contact_dynamics::contact_solver::Assembly;
+/// use contact_dynamics::prelude::*;
+///
+/// // A bar of two masses flies against a wall.
+/// let entries = [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)].map(|(i, j, k)| Triplet::new(i, j, k));
+/// let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &entries)?;
+/// let bar = LinearSystem::lumped(vec![1.0; 2], stiffness)?;
+/// let mut run = Simulation::builder(bar, GeneralizedAlpha::default(), 0.01)
+///     .velocity(vec![1.0; 2])
+///     .constraint(LinearRows::new().unilateral(&[(1, -1.0)], 0.005))
+///     .contact_solver(ActiveSet::default().with_assembly(Assembly::Never))
+///     .build()?;
+/// run.run_until(0.1, &mut ())?;
+/// assert!(run.state().contacts().forces()[0] > 0.0);
+/// assert!(run.statistics().contact_products > 0 && run.statistics().contact_iterations == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Assembly {

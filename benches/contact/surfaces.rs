@@ -57,10 +57,11 @@ fn scene(n: usize, arguments: &Arguments) {
         for _ in 0..WARM_UP {
             run.step().expect("a well-posed step");
         }
-        let iterations = run.statistics().contact_iterations;
+        let before = *run.statistics();
         run.step().expect("a well-posed step");
-        let last = run.statistics().contact_iterations - iterations;
-        println!("{name}: {} rows closed, {last} iterations of the contact solver in a step", closed(&run));
+        let iterations = run.statistics().contact_iterations - before.contact_iterations;
+        let products = run.statistics().contact_products - before.contact_products;
+        println!("{name}: {} closed, {iterations} iterations with W and {products} products in a step", closed(&run));
         table.row(name, move || run.step().expect("a well-posed step"));
     }
     let [samples, calls] = [if n > 20 { 5 } else { 15 }, 10_000 / solid.dofs()].map(|times| arguments.repeated(times));

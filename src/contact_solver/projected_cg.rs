@@ -136,7 +136,9 @@ impl<T: Real> ProjectedCg<T> {
                 if is_balanced || left <= T::of(LOOK) * *looked.get_or_insert(left) {
                     looked = Some(left);
                     let change = self.statuses.update(&mut self.rows, &mut self.x, &mut self.metric);
-                    if change == Change::Some {
+                    // Projections that are not exact leave closed rows a little open.
+                    let mut is_closed = || self.metric.miss(&self.rows, &self.statuses, &self.x).is_met();
+                    if change == Change::Some || (is_balanced && !is_closed()) {
                         break;
                     }
                     if is_balanced {

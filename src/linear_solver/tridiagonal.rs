@@ -291,6 +291,10 @@ impl<T: Real> Factorization<T> for Factor<T> {
         Ok(())
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn stored_values(&self) -> usize {
         2 * self.x.len() - (self.begins.len() - 1)
     }

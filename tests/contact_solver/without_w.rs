@@ -31,7 +31,7 @@ fn compare<S: System<f64> + 'static>(
             Simulation::builder(system(), scheme(), size / MATERIAL.wave_speed())
                 .velocity(velocity.to_vec())
                 .constraint(contact())
-                .contact_solver(Box::new(ActiveSet::default().with_assembly(assembly)))
+                .contact_solver(ActiveSet::default().with_assembly(assembly))
                 .corrector(PersistencyCorrection::with_history_projection())
                 .build()
                 .unwrap()
@@ -169,7 +169,7 @@ fn what_cannot_be_closed_is_refused() {
     let rows = || LinearRows::new().equality(&[(2, 1.0)], 0.0).equality(&[(2, 1.0)], -0.1);
     let mut run = Simulation::builder(solid.system::<f64>(), GeneralizedAlpha::default(), 1.0)
         .constraint(rows())
-        .contact_solver(Box::new(ActiveSet::default().with_assembly(Assembly::Never)))
+        .contact_solver(ActiveSet::default().with_assembly(Assembly::Never))
         .build();
     let error = match &mut run {
         Ok(run) => run.step().unwrap_err(),

@@ -249,13 +249,19 @@ impl<T: Real> Metric<T> {
         }
     }
 
+    /// How far the closed rows are from closed; their values are the right-hand side of the next solve.
+    pub(super) fn miss(&mut self, rows: &Rows<T>, statuses: &Statuses<T>, x: &[T]) -> Miss<T> {
+        let dofs = x.len() - rows.len();
+        let gap = |row: usize| rows.gap(row, x) + x[dofs + row];
+        self.set_right(statuses, gap, |row| [rows.tolerance[row], rows.magnitude(row, x)])
+    }
+
     /// Closes the closed rows: x −= D⁻¹ Gᵀ l. Returns how far they are from closed then.
     pub(super) fn close(&mut self, rows: &Rows<T>, statuses: &Statuses<T>, inverse: &[T], x: &mut [T]) -> Miss<T> {
         let dofs = inverse.len() - rows.len();
         let mut before = Miss { left: T::infinity(), size: T::zero() };
         for _ in 0..PASSES {
-            let gap = |row: usize| rows.gap(row, x) + x[dofs + row];
-            let miss = self.set_right(statuses, gap, |row| [rows.tolerance[row], rows.magnitude(row, x)]);
+            let miss = self.miss(rows, statuses, x);
             if miss.left <= rounding(miss.size) || miss.left > T::of(STALLS) * before.left || !self.solve() {
                 return miss;
             }
