@@ -24,7 +24,7 @@ pub(crate) enum Product<T> {
     /// A symmetric tridiagonal matrix.
     Tridiagonal { diagonal: Vec<T>, beside: Vec<T> },
     /// A symmetric matrix whose columns form groups of two or three.
-    Supervariables(Supervariables<T>),
+    Supervariables(Box<Supervariables<T>>),
 }
 
 impl<T: Real> Product<T> {
@@ -42,12 +42,12 @@ impl<T: Real> Product<T> {
             let beside = (1..n).map(|j| super::entry(a, j, j - 1)).collect();
             return Self::Tridiagonal { diagonal, beside };
         }
-        Supervariables::find(a.symbolic()).map_or(Self::Rows, Self::Supervariables)
+        Self::of_symmetric(a.symbolic())
     }
 
     /// For all symmetric matrices of a pattern.
     pub(crate) fn of_symmetric(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
-        Supervariables::find(pattern).map_or(Self::Rows, Self::Supervariables)
+        Supervariables::find(pattern).map_or(Self::Rows, |found| Self::Supervariables(Box::new(found)))
     }
 
     /// Packs the entries of a symmetric matrix that [`write_packed`](Self::write_packed) then reads. Returns whether
@@ -198,26 +198,20 @@ impl<T: Real> Supervariables<T> {
 
     /// Copies the entries of a matrix at and below the diagonal.
     fn pack(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { all, groups, parts, packed } = self;
-        let last = all.len() - 1;
-        let height = |at: usize| {
-            let groups = (all[at + 1].first - all[at].first) as usize;
-            (usize::from(all[at].width), all[at].entries(groups))
-        };
+        let Self { all, parts, packed, .. } = self;
+        let entries = |pair: &[Supervariable]| pair[0].entries((pair[1].first - pair[0].first) as usize);
         packed.clear();
-        memory::grow(packed, (0..last).map(|at| height(at).1).sum(), 1, "the packed effective matrix")?;
-        debug_assert!(groups.len() == all[last].first as usize);
-        let mut rest = &mut packed[..];
-        let mut begin = 0;
-        for at in 0..last {
+        memory::grow(packed, all.windows(2).map(entries).sum(), 1, "the packed effective matrix")?;
+        let (mut rest, mut begin) = (&mut packed[..], 0);
+        for (at, pair) in all.windows(2).enumerate() {
             if let Some(part) = parts.iter_mut().find(|part| part.supervariables.start == at) {
                 part.packed = begin;
             }
-            let (width, entries) = height(at);
-            begin += entries;
-            for k in 0..width {
-                let (own, behind) = rest.split_at_mut(entries / width);
-                let end = a.col_ptr()[all[at].column as usize + k + 1];
+            begin += entries(pair);
+            let (first, width) = (pair[0].column as usize, usize::from(pair[0].width));
+            for column in first..first + width {
+                let (own, behind) = rest.split_at_mut(entries(pair) / width);
+                let end = a.col_ptr()[column + 1];
                 own.copy_from_slice(&a.val()[end - own.len()..end]);
                 rest = behind;
             }
@@ -332,7 +326,8 @@ mod tests {
     fn groups_of_rows_that_are_no_nodes() {
         let a = matrix(&[3, 2, 3], |_, q| q == 0);
         let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
-        let Product::Supervariables(Supervariables { all, .. }) = &product else { panic!("dofs go together") };
+        let Product::Supervariables(found) = &product else { panic!("dofs go together") };
+        let all = &found.all;
         assert!(all[0].width == 3 && all[0].group == 1);
         check(&a, &mut product);
     }
@@ -358,14 +353,16 @@ mod tests {
         let band = |p: usize, q: usize| p - q < 14;
         let a = matrix(&vec![3; 4500], band);
         let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
-        let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
+        let Product::Supervariables(found) = &product else { panic!("dofs go together") };
+        let parts = &found.parts;
         assert!(parts.len() > 1 && parts.iter().all(|part| !part.sums.is_empty()));
         check(&a, &mut product);
 
         let scattered = |p: usize| crate::sparse::scattered(p) % 4500;
         let far = matrix(&vec![3; 4500], |p, q| scattered(p).abs_diff(scattered(q)) < 14);
         let mut product = Product::new(far.as_ref(), Symmetry::Symmetric);
-        let Product::Supervariables(Supervariables { parts, .. }) = &product else { panic!("dofs go together") };
+        let Product::Supervariables(found) = &product else { panic!("dofs go together") };
+        let parts = &found.parts;
         assert!(parts.len() == 1 && far.val().len() > 4 * Supervariables::<f64>::GRAIN);
         check(&far, &mut product);
     }

@@ -185,6 +185,8 @@ fn restrict<T: Real>(set: AdmissibleSet, multipliers: &mut [T]) {
     let bound = T::of(friction) * normal.max(T::zero());
     let size = tangential.iter().fold(T::zero(), |size, &f| size.hypot(f));
     if size > bound {
-        tangential.iter_mut().for_each(|f| *f *= bound / size);
+        for f in tangential {
+            *f *= bound / size;
+        }
     }
 }
