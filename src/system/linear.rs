@@ -131,7 +131,8 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             });
         }
         same_size("stiffness matrix", n, stiffness.as_ref())?;
-        let product = Product::new(stiffness.as_ref(), sparse::symmetry("stiffness", stiffness.as_ref())?);
+        let mut product = Product::new(stiffness.as_ref(), sparse::symmetry("stiffness", stiffness.as_ref())?);
+        product.pack_large(stiffness.as_ref())?;
         Ok(Self {
             mass,
             stiffness,

@@ -42,7 +42,7 @@ pub(super) struct Miss<T> {
 
 impl<T: Real> Miss<T> {
     pub(super) fn is_met(&self) -> bool {
-        self.left <= T::of(LEFT) * self.size
+        self.left <= rounding(self.size).max(T::of(LEFT) * self.size)
     }
 
     /// As a share of the magnitude.
@@ -135,7 +135,7 @@ impl<T: Real> Metric<T> {
             let column = starts[j]..starts[j + 1];
             factorized.extend(places[column.clone()].iter().zip(&values[column]).map(|(&i, &value)| {
                 match (i == j, closed[i], closed[j]) {
-                    (true, Some(own), _) => value + T::of(SHIFT) * value + own,
+                    (true, Some(own), _) => value + T::of(SHIFT).max(T::epsilon()) * value + own,
                     // An open row is an equation of its own.
                     (true, None, _) => {
                         if value > T::zero() {
