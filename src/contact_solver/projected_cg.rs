@@ -60,7 +60,7 @@ pub(crate) struct RowData<'a, T> {
     pub(crate) along: &'a [Option<[T; 2]>],
 }
 
-/// What an iteration has spent and left.
+/// The cost and the result of an iteration.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outcome {
     /// Products with A.
@@ -252,7 +252,7 @@ impl<T: Real> ProjectedCg<T> {
     }
 }
 
-/// What is multiplied with A.
+/// A vector that is multiplied with A.
 #[derive(Clone, Copy)]
 enum Operand {
     Solution,

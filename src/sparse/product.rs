@@ -50,8 +50,8 @@ impl<T: Real> Product<T> {
         Supervariables::find(pattern).map_or(Self::Rows, |found| Self::Supervariables(Box::new(found)))
     }
 
-    /// Packs the entries of the matrix if it is too large for a cache: products are then faster by what they do not
-    /// read, at a quarter more memory.
+    /// Packs the entries of a matrix that is too large for a cache: products then read half as much, and the matrix
+    /// takes a quarter more memory.
     pub(crate) fn pack_large(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
         /// Number of entries, of both triangles.
         const LARGE: usize = 1 << 17;

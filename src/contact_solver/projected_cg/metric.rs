@@ -61,10 +61,10 @@ const ANOTHER: f64 = 1e-3;
 /// Projections of one residual: each reduces what is left by the share that the factor misses.
 const PASSES: usize = 8;
 
-/// What may be left of a residual along the closed rows, as a share of it.
+/// The part of a residual along the closed rows that may remain, as a share of it.
 const LEFT: f64 = 1e-10;
 
-/// What a projection must leave of the last one's rest at most, or no further one is made.
+/// Projections go on while each leaves less than this share of the residual before it.
 const STALLS: f64 = 0.5;
 
 impl<T: Real> Metric<T> {

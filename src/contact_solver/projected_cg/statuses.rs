@@ -10,7 +10,7 @@ use crate::real::Real;
 use crate::rounding::projected_residual;
 use std::ops::Range;
 
-/// What a row does in the equations.
+/// The part of a row in the equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// λ = 0.
@@ -21,7 +21,7 @@ pub(super) enum Role {
     Given,
 }
 
-/// Whether equations differ from those that were solved.
+/// Whether the equations differ from the equations that were solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Change {
     None,

@@ -19,7 +19,7 @@ pub struct Statistics {
     pub factorizations: u64,
     /// Contact problems solved; a stage without near contacts has none.
     pub contact_solves: u64,
-    /// Active-set iterations of all contact problems together, of those with W.
+    /// Active-set iterations of all contact problems with W together.
     pub contact_iterations: u64,
     /// Products with the effective matrix for contact problems without W
     /// ([`Assembly`](crate::contact_solver::Assembly)).
