@@ -192,7 +192,9 @@ impl<T: Real> JumpProblem<T> {
             Assembly::Automatic => MANY,
             Assembly::Never => 1,
         };
-        let is_large = self.rows.len() >= large && projection.lumped().is_some();
+        let is_large = self.rows.len() >= large
+            && projection.lumped().is_some()
+            && projection.largest_group(g, &self.rows) >= large;
         if !has_friction && !is_large && self.blocks.iter().all(Block::is_equation) {
             return self.solve_equations(g, projection, |row| no_response(t, id(row)));
         }

@@ -333,6 +333,14 @@ impl<T: Real> JumpProjection<T> {
         self.factored = false;
     }
 
+    /// The size of the largest group of some rows.
+    pub(crate) fn largest_group(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> usize {
+        if !self.factored || self.closed != rows {
+            self.sort(g, rows);
+        }
+        (0..self.groups.len()).map(|group| self.groups.group(group).len()).max().unwrap_or(0)
+    }
+
     /// M⁻¹, if it is diagonal.
     pub(crate) fn lumped(&self) -> Option<&[T]> {
         match &self.inverse {
