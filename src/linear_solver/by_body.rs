@@ -323,6 +323,10 @@ impl<T: Real> Factorization<T> for Factors<T> {
         self.parts.iter_mut().for_each(|part| part.factor.release());
     }
 
+    fn is_symmetric(&self) -> bool {
+        self.parts.iter().all(|part| part.factor.is_symmetric())
+    }
+
     fn stored_values(&self) -> usize {
         self.parts.iter().map(|part| part.factor.stored_values()).sum()
     }

@@ -101,6 +101,10 @@ impl<T: Real> Factorization<T> for AgreedFactorization<T> {
         self.stored_values
     }
 
+    fn is_symmetric(&self) -> bool {
+        self.inner.is_symmetric()
+    }
+
     fn iterations(&self) -> usize {
         self.inner.iterations()
     }

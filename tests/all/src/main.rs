@@ -8,20 +8,17 @@ use std::process::{Command, ExitCode, Stdio};
 fn main() -> ExitCode {
     let mut passed = 0;
     for kinds in [&["--lib", "--bins", "--tests"][..], &["--doc"]] {
-        match run(kinds) {
-            Ok(count) => passed += count,
-            Err(message) => {
-                eprintln!("{message}, after {passed} tests that passed");
-                return ExitCode::FAILURE;
-            }
+        if let Err(message) = run(kinds, &mut passed) {
+            eprintln!("{message}; {passed} tests have passed");
+            return ExitCode::FAILURE;
         }
     }
     println!("\nAll {passed} tests passed.");
     ExitCode::SUCCESS
 }
 
-/// Runs the tests of some kinds, prints what they print, and returns how many passed.
-fn run(kinds: &[&str]) -> Result<u64, String> {
+/// Runs the tests of some kinds, prints what they print, and counts those that pass.
+fn run(kinds: &[&str], passed: &mut u64) -> Result<(), String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut child = Command::new(cargo)
         .args(["test", "--workspace", "--all-features"])
@@ -29,14 +26,13 @@ fn run(kinds: &[&str]) -> Result<u64, String> {
         .stdout(Stdio::piped())
         .spawn()
         .map_err(|error| format!("cargo does not start: {error}"))?;
-    let mut passed = 0;
     for line in child.stdout.take().into_iter().flat_map(|output| BufReader::new(output).lines()) {
         let line = line.map_err(|error| format!("the output cannot be read: {error}"))?;
         println!("{line}");
-        passed += count(&line);
+        *passed += count(&line);
     }
     match child.wait() {
-        Ok(status) if status.success() => Ok(passed),
+        Ok(status) if status.success() => Ok(()),
         Ok(_) => Err("A test failed".to_string()),
         Err(error) => Err(format!("cargo was lost: {error}")),
     }
@@ -44,7 +40,6 @@ fn run(kinds: &[&str]) -> Result<u64, String> {
 
 /// How many tests passed by a line like `test result: ok. 12 passed; 0 failed; …`.
 fn count(line: &str) -> u64 {
-    let words = line.strip_prefix("test result: ").into_iter().flat_map(|rest| rest.split(' '));
-    let words: Vec<&str> = words.collect();
+    let words: Vec<&str> = line.strip_prefix("test result: ").into_iter().flat_map(|rest| rest.split(' ')).collect();
     words.windows(2).find(|pair| pair[1].starts_with("passed")).and_then(|pair| pair[0].parse().ok()).unwrap_or(0)
 }
