@@ -73,7 +73,8 @@ pub(crate) struct JumpProblem<T> {
     /// (row of the gap, unit vector of its friction) of the contacts of an earlier problem.
     directions: Vec<(usize, [T; 2])>,
     group: Group<T>,
-    pub(super) many: Box<ManyRows<T>>,
+    /// None until a large group is solved.
+    pub(super) many: Option<Box<ManyRows<T>>>,
 }
 
 /// How the friction of sliding contacts enters a problem.

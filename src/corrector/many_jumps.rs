@@ -41,7 +41,7 @@ impl<T: Real> JumpProblem<T> {
         if positions.len() < large || positions.iter().any(is_known) {
             return false;
         }
-        let mut many = std::mem::take(&mut self.many);
+        let mut many = self.many.take().unwrap_or_default();
         let mut solved = many.pose(self, g, positions, inverse);
         while solved {
             solved = many.solve(g, inverse);
@@ -53,7 +53,7 @@ impl<T: Real> JumpProblem<T> {
             self.keep_in_cones(positions, presses);
             many.measure(self, g, positions, inverse);
         }
-        self.many = many;
+        self.many = Some(many);
         solved
     }
 
