@@ -360,14 +360,16 @@ impl<T: Real> Operator<T> {
         }
         self.read_products(system, h, at)?;
         let Some(products) = &mut self.products else { return Ok(None) };
+        let mut affordable = usize::MAX;
         if assembly == Assembly::Automatic {
             let entries = rows.iter().map(|&row| g.located(row).count()).sum();
             let with_w = self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
-            if products.work(entries) > with_w {
-                return Ok(None);
+            match products.affordable(entries, with_w) {
+                Some(count) => affordable = count,
+                None => return Ok(None),
             }
         }
-        let outcome = products.solve((&self.matrix, system), (g, rows), data, multipliers);
+        let outcome = products.solve((&self.matrix, system), (g, rows), data, multipliers, affordable);
         if outcome.is_solved {
             forces.fill(T::zero());
             for (&row, &lambda) in rows.iter().zip(&*multipliers) {

@@ -32,6 +32,13 @@ pub(super) struct Products<T> {
 const LOOKS: usize = 40;
 const PATIENCE: usize = 3;
 
+/// Products up to which the iteration is chosen: with more, as at large Courant numbers and for modal coordinates, their
+/// number is not well known.
+const MANY_PRODUCTS: usize = 64;
+
+/// Products that are tried in any case.
+const FEW_PRODUCTS: usize = 24;
+
 /// Vectors of the system's size that a solution takes.
 const VECTORS: usize = 6;
 
@@ -80,9 +87,12 @@ impl<T: Real> Products<T> {
         Ok(())
     }
 
-    /// Work of a solution for rows with so many entries, in multiplications.
-    pub(super) fn work(&self, entries: usize) -> f64 {
-        self.expected as f64 * (self.entries + 8 * self.inverse.len() + 8 * entries) as f64
+    /// Products to be tried for rows with so many entries, if the work with W (in multiplications) is no less.
+    pub(super) fn affordable(&self, entries: usize, with_w: f64) -> Option<usize> {
+        let of_one = (self.entries + 8 * self.inverse.len() + 8 * entries) as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
+        let count = (with_w / of_one) as usize;
+        (self.expected <= count.min(MANY_PRODUCTS)).then_some(count.max(FEW_PRODUCTS))
     }
 
     /// Another stage begins.
@@ -90,20 +100,21 @@ impl<T: Real> Products<T> {
         self.cg.begin();
     }
 
-    /// Solves for the multipliers of some rows.
+    /// Solves for the multipliers of some rows with at most `affordable` products.
     pub(super) fn solve(
         &mut self,
         (matrix, system): (&EffectiveMatrix<T>, &dyn System<T>),
         (g, rows): (&ContactJacobian<T>, &[usize]),
         data: RowData<'_, T>,
         multipliers: &mut [T],
+        affordable: usize,
     ) -> Outcome {
         let Self { product, is_packed, inverse, expected, cg, .. } = self;
         let mut multiply = |x: &[T], y: &mut [T]| match *is_packed {
             true => product.write_packed(x, y),
             false => product.write(T::one(), matrix.view(system), x, y),
         };
-        let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS);
+        let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS };
         let mut problem = SparseProblem { product: &mut multiply, inverse, g, rows, data, patience };
         cg.solve(&mut problem, multipliers)
