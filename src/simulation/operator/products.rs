@@ -4,7 +4,6 @@ use crate::contact::ContactJacobian;
 use crate::contact_solver::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
 use crate::mass::Mass;
-use crate::memory;
 use crate::real::Real;
 use crate::rounding::projected_residual;
 use crate::simulation::operator::matrix::EffectiveMatrix;
@@ -39,9 +38,6 @@ const MANY_PRODUCTS: usize = 64;
 /// Products that are tried in any case.
 const FEW_PRODUCTS: usize = 24;
 
-/// Vectors of the system's size that a solution takes.
-const VECTORS: usize = 6;
-
 impl<T: Real> Products<T> {
     pub(super) fn new(matrix: &EffectiveMatrix<T>, system: &dyn System<T>) -> Self {
         let product = Product::of_symmetric(matrix.view(system).symbolic());
@@ -59,7 +55,6 @@ impl<T: Real> Products<T> {
     /// Reads a matrix.
     pub(super) fn read(&mut self, matrix: &EffectiveMatrix<T>, system: &dyn System<T>, h: f64) -> Result<()> {
         let a = matrix.view(system);
-        memory::probe::<T>(a.ncols(), VECTORS, "contact without W")?;
         self.is_packed = self.product.pack(a)?;
         self.entries = a.val().len().midpoint(a.ncols());
         let (mut whole, mut mass) = (0.0, 0.0);
