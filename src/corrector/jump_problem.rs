@@ -193,7 +193,7 @@ impl<T: Real> JumpProblem<T> {
             Assembly::Automatic => MANY,
             Assembly::Never => 1,
         };
-        let is_large = self.rows.len() >= large
+        let is_large = self.blocks.len() >= large
             && projection.lumped().is_some()
             && projection.largest_group(g, &self.rows) >= large;
         if !has_friction && !is_large && self.blocks.iter().all(Block::is_equation) {

@@ -334,14 +334,14 @@ impl<T: Real> Operator<T> {
         self.responses.respond((rows, multipliers), forces, response);
     }
 
-    /// Whether problems of so many rows may be solved by products with A.
-    pub(crate) fn multiplies(&self, assembly: Assembly, rows: usize) -> bool {
+    /// Whether problems of so many contacts may be solved by products with A.
+    pub(crate) fn multiplies(&self, assembly: Assembly, contacts: usize) -> bool {
         let enough = match assembly {
             Assembly::Always => return false,
             Assembly::Automatic => MANY,
             Assembly::Never => 1,
         };
-        rows >= enough && self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric()
+        contacts >= enough && self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric()
     }
 
     /// Solves a contact problem by products with A, unless forming W is less work or the only way. Leaves the forces

@@ -130,7 +130,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     /// Returns the number of products.
     fn solve_by_products(&mut self) -> Result<Option<usize>> {
         let assembly = self.solver.assembly();
-        if !self.operator.multiplies(assembly, self.contact.rows.problem.rows.len()) {
+        if !self.operator.multiplies(assembly, self.contact.rows.problem.sets.len()) {
             return Ok(None);
         }
         self.guess_multipliers();
