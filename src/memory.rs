@@ -40,6 +40,14 @@ pub(crate) fn grow<T: Zero + Clone>(
     Ok(())
 }
 
+/// Replaces the entries of a vector by those of another one.
+pub(crate) fn copy<T: Copy>(vector: &mut Vec<T>, of: &[T], what: &'static str) -> Result<()> {
+    vector.clear();
+    make_room(vector, of.len(), what)?;
+    vector.extend_from_slice(of);
+    Ok(())
+}
+
 /// Checks that `rows · columns` entries could be allocated, before code of a host or a library allocates them that
 /// cannot return an error.
 pub(crate) fn probe<T>(rows: usize, columns: usize, what: &'static str) -> Result<()> {

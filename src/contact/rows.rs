@@ -1,5 +1,7 @@
 //! Gaps between two searches: the rows of G, and the rates that do not come from them.
 
+use crate::error::Result;
+use crate::memory::{grow, make_room};
 use crate::real::Real;
 use crate::rounding::share_of_rounding;
 use std::ops::Range;
@@ -111,6 +113,24 @@ impl<T: Real> ContactJacobian<T> {
         self.pointers.push(self.dofs.len());
     }
 
+    /// Removes all rows, and takes memory for others.
+    pub(crate) fn begin(&mut self, rows: usize, entries: usize) -> Result<()> {
+        const WHAT: &str = "the rows of a contact problem";
+        self.clear();
+        make_room(&mut self.pointers, rows, WHAT)?;
+        make_room(&mut self.dofs, entries, WHAT)?;
+        make_room(&mut self.weights, entries, WHAT)
+    }
+
+    /// Combines a row and the next one, which acts on the same dofs: c of it and s of the other, and across.
+    pub(crate) fn turn(&mut self, row: usize, [c, s]: [T; 2]) {
+        let [start, middle, end] = [0, 1, 2].map(|k| self.pointers[row + k]);
+        let (one, other) = self.weights[start..end].split_at_mut(middle - start);
+        for (x, y) in one.iter_mut().zip(other) {
+            (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+        }
+    }
+
     /// Copies another matrix into the existing memory.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.pointers.clone_from(&other.pointers);
@@ -214,56 +234,90 @@ impl<T: Real> ContactJacobian<T> {
     }
 }
 
-/// Products of vectors with the rows of a list. Most rows share no dof with a vector and are not visited.
+/// Products of vectors with the rows of a list. Rows that share no dof with a vector are not visited.
 #[derive(Debug, Default)]
 pub(crate) struct RowProducts<T> {
-    /// (dof, index of a row that acts on it), ascending.
-    acting: Vec<(usize, usize)>,
-    /// For each row the vector that has visited it last, counted from 1.
+    /// For each dof the first of the entries that act on it; each names the next one.
+    first: Vec<usize>,
+    acting: Vec<Acting<T>>,
+    /// Products of the present vector by row, and the rows that it has visited.
+    sums: Vec<T>,
     visited: Vec<usize>,
-    vectors: usize,
-    /// A vector by dof; zero outside of `each`.
-    weights: Vec<T>,
+    is_visited: Vec<bool>,
 }
+
+/// A weight of a row on a dof.
+#[derive(Clone, Copy, Debug)]
+struct Acting<T> {
+    dof: usize,
+    row: usize,
+    weight: T,
+    next: usize,
+}
+
+/// After the last entry of a dof.
+const LAST: usize = usize::MAX;
 
 impl<T: Real> RowProducts<T> {
     /// Memory for rows on this number of dofs.
     pub(crate) fn reserve(&mut self, rows: usize, dofs: usize) {
+        self.first.resize(dofs.max(self.first.len()), LAST);
         self.acting.reserve(4 * rows);
+        self.sums.reserve(rows);
         self.visited.reserve(rows);
-        self.weights.resize(dofs.max(self.weights.len()), T::zero());
+        self.is_visited.reserve(rows);
     }
 
     /// Lists rows, of which `row` returns the (dof, weight) pairs, on this number of dofs.
-    pub(crate) fn list<R: Iterator<Item = (usize, T)>>(&mut self, rows: usize, dofs: usize, row: impl Fn(usize) -> R) {
-        self.weights.resize(dofs.max(self.weights.len()), T::zero());
-        self.visited.clear();
-        self.visited.resize(rows, 0);
-        self.vectors = 0;
-        self.acting.clear();
-        self.acting.extend((0..rows).flat_map(|k| row(k).map(move |(dof, _)| (dof, k))));
-        self.acting.sort_unstable();
-    }
-
-    /// Calls `put` with the index of each row that shares a dof with a vector, and their product.
-    pub(crate) fn each<V: Iterator<Item = (usize, T)>, R: Iterator<Item = (usize, T)>>(
+    pub(crate) fn list<R: Iterator<Item = (usize, T)>>(
         &mut self,
-        vector: impl Fn() -> V,
+        rows: usize,
+        dofs: usize,
         row: impl Fn(usize) -> R,
-        mut put: impl FnMut(usize, T),
-    ) {
-        let Self { acting, visited, vectors, weights } = self;
-        *vectors += 1;
-        vector().for_each(|(dof, weight)| weights[dof] += weight);
-        for (dof, _) in vector() {
-            let first = acting.partition_point(|&(other, _)| other < dof);
-            for &(_, k) in acting[first..].iter().take_while(|&&(other, _)| other == dof) {
-                if visited[k] != *vectors {
-                    visited[k] = *vectors;
-                    put(k, row(k).map(|(dof, weight)| weight * weights[dof]).sum());
-                }
+    ) -> Result<()> {
+        const WHAT: &str = "the products of contact rows";
+        let Self { first, acting, sums, visited, is_visited } = self;
+        acting.drain(..).for_each(|entry| first[entry.dof] = LAST);
+        if first.len() < dofs {
+            make_room(first, dofs - first.len(), WHAT)?;
+            first.resize(dofs, LAST);
+        }
+        make_room(acting, (0..rows).map(|k| row(k).count()).sum(), WHAT)?;
+        // The last row first: those of a dof then ascend.
+        for k in (0..rows).rev() {
+            for (dof, weight) in row(k) {
+                let next = std::mem::replace(&mut first[dof], acting.len());
+                acting.push(Acting { dof, row: k, weight, next });
             }
         }
-        vector().for_each(|(dof, _)| weights[dof] = T::zero());
+        sums.clear();
+        visited.clear();
+        is_visited.clear();
+        grow(sums, rows, 1, WHAT)?;
+        make_room(visited, rows, WHAT)?;
+        make_room(is_visited, rows, WHAT)?;
+        is_visited.resize(rows, false);
+        Ok(())
+    }
+
+    /// Calls `put` with each row that shares a dof with a vector, in ascending order, and their product.
+    pub(crate) fn each(&mut self, vector: impl Iterator<Item = (usize, T)>, mut put: impl FnMut(usize, T)) {
+        let Self { first, acting, sums, visited, is_visited } = self;
+        for (dof, own) in vector {
+            let mut at = first[dof];
+            while let Some(&Acting { row, weight, next, .. }) = acting.get(at) {
+                if !is_visited[row] {
+                    is_visited[row] = true;
+                    visited.push(row);
+                }
+                sums[row] += own * weight;
+                at = next;
+            }
+        }
+        visited.sort_unstable();
+        for row in visited.drain(..) {
+            is_visited[row] = false;
+            put(row, std::mem::replace(&mut sums[row], T::zero()));
+        }
     }
 }

@@ -18,11 +18,16 @@ mod statuses;
 use super::AdmissibleSet;
 use crate::contact::ContactJacobian;
 use crate::dense::dot;
+use crate::error::Result;
+use crate::memory;
 use crate::real::Real;
 use crate::rounding::projected_residual;
 use metric::Metric;
 use rows::Rows;
-use statuses::{Change, Statuses};
+use statuses::Statuses;
+
+/// What memory is asked for.
+const WHAT: &str = "a contact problem without W";
 
 /// Writes A x to its second argument, with x its first.
 type Product<'a, T> = &'a mut dyn FnMut(&[T], &mut [T]);
@@ -33,9 +38,6 @@ pub(crate) struct SparseProblem<'a, T> {
     pub(crate) product: Product<'a, T>,
     /// D⁻¹ by dof: one over the diagonal of A, zero for dofs that do not move.
     pub(crate) inverse: &'a [T],
-    /// G, of which the problem has these rows, block after block.
-    pub(crate) g: &'a ContactJacobian<T>,
-    pub(crate) rows: &'a [usize],
     pub(crate) data: RowData<'a, T>,
     pub(crate) patience: Patience,
 }
@@ -49,9 +51,12 @@ pub(crate) struct Patience {
     pub(crate) looks: usize,
 }
 
-/// c, q and the rounding of y of each row, and the set of each block.
+/// The rows: c, q and the rounding of y of each row, and the set of each block.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowData<'a, T> {
+    /// G, of which the problem has these rows, block after block.
+    pub(crate) g: &'a ContactJacobian<T>,
+    pub(crate) rows: &'a [usize],
     pub(crate) compliance: &'a [T],
     pub(crate) offset: &'a [T],
     pub(crate) tolerance: &'a [T],
@@ -101,14 +106,13 @@ impl<T: Real> ProjectedCg<T> {
     }
 
     /// Solves for the multipliers, which contain a guess of the closed rows without friction.
-    pub(crate) fn solve(&mut self, problem: &mut SparseProblem<'_, T>, multipliers: &mut [T]) -> Outcome {
+    pub(crate) fn solve(&mut self, problem: &mut SparseProblem<'_, T>, multipliers: &mut [T]) -> Result<Outcome> {
         let mut outcome = Outcome { products: 0, residual: f64::NAN, is_solved: false };
-        let limit = problem.patience.products;
-        self.take(problem, multipliers);
+        self.take(problem, multipliers)?;
         let mut scale = T::zero();
-        while outcome.products < limit && self.statuses.looks < problem.patience.looks {
+        while outcome.products < problem.patience.products && self.statuses.looks < problem.patience.looks {
             self.set_compliances();
-            if !self.metric.follow(&self.rows, &self.statuses, &self.inverse) {
+            if !self.metric.follow(&self.rows, &self.statuses, &self.inverse)? {
                 break;
             }
             let miss = self.metric.close(&self.rows, &self.statuses, &self.inverse, &mut self.x);
@@ -120,67 +124,43 @@ impl<T: Real> ProjectedCg<T> {
                 outcome.residual = miss.share();
                 break;
             }
-            self.balance(problem);
-            outcome.products += 1;
-            let (mut last, mut looked) = (None, None);
-            loop {
-                scale = scale.max(self.metric.square(&self.statuses.multipliers).max(T::zero()).sqrt());
-                let goal = projected_residual::<T>() * scale;
-                let square = self.square();
-                if !square.is_finite() {
-                    return outcome;
+            match self.iterate(problem, &mut scale, &mut outcome) {
+                End::OtherEquations => {}
+                End::GivenUp => break,
+                End::Solved => {
+                    self.rows.read(&self.statuses.multipliers, multipliers);
+                    (outcome.is_solved, self.is_begun) = (true, true);
+                    break;
                 }
-                let left = square.sqrt();
-                outcome.residual = ratio(left, scale);
-                let is_balanced = left <= goal;
-                if is_balanced || left <= T::of(LOOK) * *looked.get_or_insert(left) {
-                    looked = Some(left);
-                    let change = self.statuses.update(&mut self.rows, &mut self.x, &mut self.metric);
-                    // Projections that are not exact leave closed rows a little open.
-                    let mut is_closed = || self.metric.miss(&self.rows, &self.statuses, &self.x).is_met();
-                    if change == Change::Some || (is_balanced && !is_closed()) {
-                        break;
-                    }
-                    if is_balanced {
-                        outcome.is_solved = true;
-                        self.rows.read(&self.statuses.multipliers, multipliers);
-                        self.is_begun = true;
-                        return outcome;
-                    }
-                }
-                if outcome.products == limit || !self.descend(problem, square, &mut last) {
-                    return outcome;
-                }
-                outcome.products += 1;
             }
         }
-        outcome
+        Ok(outcome)
     }
 
     /// Takes the rows of a problem. Those of the last one, linearized elsewhere, go on from its solution.
-    fn take(&mut self, problem: &SparseProblem<'_, T>, guess: &[T]) {
+    fn take(&mut self, problem: &SparseProblem<'_, T>, guess: &[T]) -> Result<()> {
         let keeps = self.is_begun && self.rows.are_of(problem);
         self.is_begun = false;
-        let (dofs, size) = (problem.inverse.len(), problem.inverse.len() + problem.rows.len());
-        let same = self.rows.take(problem, keeps);
+        let (dofs, size) = (problem.inverse.len(), problem.inverse.len() + problem.data.rows.len());
+        let same = self.rows.take(problem, keeps)?;
         if keeps {
             self.statuses.keep(&self.rows);
             self.metric.keep();
-        } else {
-            self.statuses.begin(&self.rows, guess);
-            self.x.clear();
-            self.x.resize(size, T::zero());
-            // A factor of exactly this N may stay: it changes no bit of the result.
-            match same && self.inverse.get(..dofs) == Some(problem.inverse) {
-                true => self.metric.begin(&self.statuses),
-                false => self.metric.forget(),
-            }
-            self.inverse.clear();
-            self.inverse.extend_from_slice(problem.inverse);
+            return Ok(());
         }
-        for values in [&mut self.residual, &mut self.direction, &mut self.product] {
-            values.resize(size, T::zero());
+        self.statuses.begin(&self.rows, guess)?;
+        // A factor of exactly this N may stay: it changes no bit of the result.
+        match same && self.inverse.get(..dofs) == Some(problem.inverse) {
+            true => self.metric.begin(&self.statuses),
+            false => self.metric.forget(),
         }
+        memory::copy(&mut self.inverse, problem.inverse, WHAT)?;
+        memory::make_room(&mut self.inverse, problem.data.rows.len(), WHAT)?;
+        self.x.clear();
+        for values in [&mut self.x, &mut self.residual, &mut self.direction, &mut self.product] {
+            memory::grow(values, size, 1, WHAT)?;
+        }
+        Ok(())
     }
 
     /// D⁻¹ of the displacements of compliant rows is their compliance.
@@ -190,12 +170,47 @@ impl<T: Real> ProjectedCg<T> {
         self.inverse.extend_from_slice(&self.statuses.compliance);
     }
 
+    /// Conjugate gradients with the present statuses, from a solution that closes the closed rows. `scale` is the size
+    /// of the forces.
+    fn iterate(&mut self, problem: &mut SparseProblem<'_, T>, scale: &mut T, outcome: &mut Outcome) -> End {
+        self.balance(problem);
+        outcome.products += 1;
+        let (mut last, mut looked) = (None, None);
+        *scale = scale.max(self.metric.norm(&self.statuses.multipliers));
+        loop {
+            let square = weighted(&self.residual, &self.inverse);
+            if !square.is_finite() {
+                return End::GivenUp;
+            }
+            let left = square.sqrt();
+            let goal = projected_residual::<T>() * *scale;
+            outcome.residual = ratio(left, *scale);
+            if left <= goal.max(T::of(LOOK) * *looked.get_or_insert(left)) {
+                looked = Some(left);
+                *scale = scale.max(self.metric.norm(&self.statuses.multipliers));
+                let changes = self.statuses.update(&mut self.rows, &mut self.x, &mut self.metric);
+                // Projections that are not exact leave closed rows a little open.
+                let mut is_closed = || self.metric.miss(&self.rows, &self.statuses, &self.x).is_met();
+                if changes || (left <= goal && !is_closed()) {
+                    return End::OtherEquations;
+                }
+                if left <= goal {
+                    return End::Solved;
+                }
+            }
+            if outcome.products == problem.patience.products || !self.descend(problem, square, &mut last) {
+                return End::GivenUp;
+            }
+            outcome.products += 1;
+        }
+    }
+
     /// Evaluates the residual Gᵀλ − A x, and projects it.
     fn balance(&mut self, problem: &mut SparseProblem<'_, T>) {
-        self.multiply(problem, Operand::Solution);
-        let Self { rows, metric, statuses, inverse, residual, product, .. } = self;
-        for (r, &product) in residual.iter_mut().zip(&*product) {
-            *r = -product;
+        let Self { rows, metric, statuses, inverse, x, residual, .. } = self;
+        multiply(problem, inverse, x, residual);
+        for r in residual.iter_mut() {
+            *r = -*r;
         }
         let dofs = problem.inverse.len();
         for row in 0..rows.len() {
@@ -211,25 +226,6 @@ impl<T: Real> ProjectedCg<T> {
         metric.project(rows, statuses, inverse, (residual, size));
     }
 
-    /// `product = A x` of the solution or the direction. A compliant row has the stiffness 1/c.
-    fn multiply(&mut self, problem: &mut SparseProblem<'_, T>, operand: Operand) {
-        let dofs = problem.inverse.len();
-        let Self { inverse, x, direction, product, .. } = self;
-        let x = match operand {
-            Operand::Solution => x,
-            Operand::Direction => direction,
-        };
-        (problem.product)(&x[..dofs], &mut product[..dofs]);
-        for ((product, &x), &c) in product[dofs..].iter_mut().zip(&x[dofs..]).zip(&inverse[dofs..]) {
-            *product = if c > T::zero() { x / c } else { T::zero() };
-        }
-    }
-
-    /// The square of the residual in the norm of D⁻¹.
-    fn square(&self) -> T {
-        weighted(&self.residual, &self.inverse)
-    }
-
     /// One step of conjugate gradients; `last` is the square of the residual in the last step. Returns whether the
     /// curvature is positive.
     fn descend(&mut self, problem: &mut SparseProblem<'_, T>, square: T, last: &mut Option<T>) -> bool {
@@ -238,8 +234,8 @@ impl<T: Real> ProjectedCg<T> {
         for ((p, &r), &inverse) in self.direction.iter_mut().zip(&self.residual).zip(&self.inverse) {
             *p = inverse * r + if share > T::zero() { share * *p } else { T::zero() };
         }
-        self.multiply(problem, Operand::Direction);
         let Self { rows, metric, statuses, inverse, x, residual, direction, product, .. } = self;
+        multiply(problem, inverse, direction, product);
         let curvature = dot(direction, product);
         let sound = curvature > T::zero();
         if sound {
@@ -252,11 +248,21 @@ impl<T: Real> ProjectedCg<T> {
     }
 }
 
-/// A vector that is multiplied with A.
-#[derive(Clone, Copy)]
-enum Operand {
-    Solution,
-    Direction,
+/// How an iteration ends.
+enum End {
+    Solved,
+    /// Rows have another status, or are not closed any more.
+    OtherEquations,
+    GivenUp,
+}
+
+/// `y = A x`. A compliant row has the stiffness 1/c.
+fn multiply<T: Real>(problem: &mut SparseProblem<'_, T>, inverse: &[T], x: &[T], y: &mut [T]) {
+    let dofs = problem.inverse.len();
+    (problem.product)(&x[..dofs], &mut y[..dofs]);
+    for ((y, &x), &c) in y[dofs..].iter_mut().zip(&x[dofs..]).zip(&inverse[dofs..]) {
+        *y = if c > T::zero() { x / c } else { T::zero() };
+    }
 }
 
 /// rᵀ D⁻¹ r.

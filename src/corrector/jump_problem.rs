@@ -1,10 +1,10 @@
 //! The contact problem of S = G M⁻¹ Gᵀ in total multipliers: the jumps already contain a part of them.
 
 use super::JumpProjection;
-use super::many_jumps::ManyRows;
+use super::many_jumps::ManyJumps;
 use crate::contact::{ContactId, ContactJacobian};
 use crate::contact_solver::{
-    AdmissibleSet, Assembly, ContactFailure, ContactProblem, ContactSolver, FORESEEN, MANY, contact_error, no_response,
+    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, contact_error, no_response,
 };
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
@@ -74,7 +74,7 @@ pub(crate) struct JumpProblem<T> {
     directions: Vec<(usize, [T; 2])>,
     group: Group<T>,
     /// None until a large group is solved.
-    pub(super) many: Option<Box<ManyRows<T>>>,
+    pub(super) many: Option<Box<ManyJumps<T>>>,
 }
 
 /// How the friction of sliding contacts enters a problem.
@@ -188,35 +188,27 @@ impl<T: Real> JumpProblem<T> {
         }
         // Contacts that stick and slide in turn would leave no factor of S to keep.
         let has_friction = self.rows.iter().any(|&row| g.is_tangential(row));
-        let large = match solver.assembly() {
-            Assembly::Always => usize::MAX,
-            Assembly::Automatic => MANY,
-            Assembly::Never => 1,
-        };
-        let is_large = self.blocks.len() >= large
+        let least = solver.assembly().least();
+        let is_large = self.rows.len() >= least
             && projection.lumped().is_some()
-            && projection.largest_group(g, &self.rows) >= large;
+            && projection.largest_group(g, &self.rows) >= least;
         if !has_friction && !is_large && self.blocks.iter().all(Block::is_equation) {
             return self.solve_equations(g, projection, |row| no_response(t, id(row)));
         }
-        projection.sort(g, &self.rows);
+        if !is_large {
+            projection.sort(g, &self.rows);
+        }
         let mut group = std::mem::take(&mut self.group);
         let mut result = Ok(());
         for number in 0..projection.groups().len() {
-            if is_large && self.solve_without_s((g, projection), (number, large), presses) {
-                continue;
-            }
-            // Positions of a group ascend, and a block is in one group.
-            group.rows.clear();
-            group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
-            if let Err(error) = projection.assemble(g, &group.rows, &mut group.s) {
-                result = Err(error);
-                break;
-            }
-            let positions = projection.groups().group(number);
-            if let Err(failure) = self.solve_group(positions, &mut group, solver, presses) {
-                let owner = |unknown: usize| self.owners[positions[group.unknowns[unknown]]];
-                result = Err(contact_error(t, failure, |unknown| id(self.blocks[owner(unknown)].row)));
+            result = match is_large.then(|| self.solve_without_s((g, projection), (number, least), presses)) {
+                Some(Ok(true)) => Ok(()),
+                Some(Err(error)) => Err(error),
+                Some(Ok(false)) | None => {
+                    self.solve_with_s((g, projection), (number, &mut group), solver, presses, (t, &id))
+                }
+            };
+            if result.is_err() {
                 break;
             }
         }
@@ -224,6 +216,26 @@ impl<T: Real> JumpProblem<T> {
         self.increments.clear();
         self.increments.extend(self.totals.iter().zip(&self.base).map(|(&total, &base)| total - base));
         result
+    }
+
+    /// Forms S of a group, and solves.
+    fn solve_with_s(
+        &mut self,
+        (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
+        (number, group): (usize, &mut Group<T>),
+        solver: &mut dyn ContactSolver<T>,
+        presses: T,
+        (t, id): (f64, &impl Fn(usize) -> ContactId),
+    ) -> Result<()> {
+        // Positions of a group ascend, and a block is in one group.
+        group.rows.clear();
+        group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
+        projection.assemble(g, &group.rows, &mut group.s)?;
+        let positions = projection.groups().group(number);
+        self.solve_group(positions, group, solver, presses).map_err(|failure| {
+            let owner = |unknown: usize| self.owners[positions[group.unknowns[unknown]]];
+            contact_error(t, failure, |unknown| id(self.blocks[owner(unknown)].row))
+        })
     }
 
     /// Solves equations alone. The projection keeps its factor of S while their rows stay the same.

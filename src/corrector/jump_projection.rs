@@ -217,16 +217,18 @@ impl<T: Real> JumpProjection<T> {
         self.closed.extend_from_slice(rows);
         self.prepare(g, rows)?;
         self.sort(g, rows);
+        let mut products = self.list(g, rows)?;
         let mut roots = std::mem::take(&mut self.roots);
         let mut factors = std::mem::take(&mut self.factors);
-        let mut products = self.list(g, rows);
         roots.clear();
         let (mut result, mut used) = (Ok(()), 0);
         for group in 0..self.groups.len() {
             let own = self.groups.group(group);
             let mut root = T::zero();
             if let &[only] = own {
-                self.couple((g, rows), (only, own.iter().copied()), &mut products, |_, square| root = square);
+                // Rows of other groups may share a prescribed dof with it.
+                let put = |position, square| root = if position == only { square } else { root };
+                self.couple((g, rows), (only, own.iter().copied()), &mut products, put);
             }
             let root = root.sqrt();
             roots.push(root);
@@ -397,8 +399,8 @@ impl<T: Real> JumpProjection<T> {
     pub(crate) fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], s: &mut Vec<T>) -> Result<()> {
         self.prepare(g, rows)?;
         s.clear();
-        s.resize(rows.len() * rows.len(), T::zero());
-        let mut products = self.list(g, rows);
+        memory::grow(s, rows.len(), rows.len(), "the matrix of the jumps")?;
+        let mut products = self.list(g, rows)?;
         for (j, column) in s.chunks_exact_mut(rows.len().max(1)).enumerate() {
             self.couple((g, rows), (j, 0..rows.len()), &mut products, |i, product| column[i] = product);
         }
@@ -407,12 +409,12 @@ impl<T: Real> JumpProjection<T> {
     }
 
     /// The products of a lumped mass for these rows.
-    fn list(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> RowProducts<T> {
+    fn list(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<RowProducts<T>> {
         let mut products = std::mem::take(&mut self.products);
         if matches!(self.inverse, InverseMass::Lumped(_)) {
-            products.list(rows.len(), self.dofs, |k| g.row(rows[k]));
+            products.list(rows.len(), self.dofs, |k| g.row(rows[k]))?;
         }
-        products
+        Ok(products)
     }
 
     /// Computes the columns needed for S of these rows.
@@ -471,8 +473,7 @@ impl<T: Real> JumpProjection<T> {
     ) {
         match &self.inverse {
             InverseMass::Lumped(inverse) => {
-                let response = || g.row(rows[j]).map(|(dof, weight)| (dof, weight * inverse[dof]));
-                products.each(response, |i| g.row(rows[i]), put);
+                products.each(g.row(rows[j]).map(|(dof, weight)| (dof, weight * inverse[dof])), put);
             }
             InverseMass::Consistent(inverse) => {
                 positions.for_each(|i| put(i, self.columns.of(rows[i]).product(inverse, g.row(rows[j]))));

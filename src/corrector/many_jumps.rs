@@ -5,12 +5,14 @@ use super::JumpProjection;
 use super::jump_problem::JumpProblem;
 use crate::contact::ContactJacobian;
 use crate::contact_solver::{AdmissibleSet, Patience, ProjectedCg, RowData, SparseProblem};
+use crate::error::Result;
+use crate::memory;
 use crate::real::Real;
 use crate::rounding::rounding;
 
 /// Memory for one group, with one entry per row or block.
 #[derive(Debug, Default)]
-pub(super) struct ManyRows<T> {
+pub(super) struct ManyJumps<T> {
     cg: ProjectedCg<T>,
     rows: Vec<usize>,
     compliance: Vec<T>,
@@ -27,100 +29,111 @@ pub(super) struct ManyRows<T> {
 /// How often statuses may be decided before S is formed.
 const LOOKS: usize = 16;
 
+/// What memory is asked for.
+const WHAT: &str = "the jumps of many rows";
+
 impl<T: Real> JumpProblem<T> {
-    /// Solves for the rows of a group, and returns whether it could: it has at least `large` rows, and no force in it
+    /// Solves for the rows of a group, and returns whether it could: it has at least `least` rows, and no force in it
     /// is known.
     pub(super) fn solve_without_s(
         &mut self,
         (g, projection): (&ContactJacobian<T>, &JumpProjection<T>),
-        (group, large): (usize, usize),
+        (group, least): (usize, usize),
         presses: T,
-    ) -> bool {
-        let (positions, Some(inverse)) = (projection.groups().group(group), projection.lumped()) else { return false };
+    ) -> Result<bool> {
+        let (positions, Some(inverse)) = (projection.groups().group(group), projection.lumped()) else {
+            return Ok(false);
+        };
         let is_known = |&position: &usize| self.blocks[self.owners[position]].known.is_some();
-        if positions.len() < large || positions.iter().any(is_known) {
-            return false;
+        if positions.len() < least || positions.iter().any(is_known) {
+            return Ok(false);
         }
         let mut many = self.many.take().unwrap_or_default();
-        let mut solved = many.pose(self, g, positions, inverse);
-        while solved {
-            solved = many.solve(g, inverse);
-            if !solved || !self.keep(&mut many, positions, presses) {
+        loop {
+            if !many.solve(self, g, (positions, inverse))? {
+                self.many = Some(many);
+                return Ok(false);
+            }
+            if !self.keep(&many.multipliers, positions, presses) {
                 break;
             }
         }
-        if solved {
-            self.keep_in_cones(positions, presses);
-            many.measure(self, g, positions, inverse);
-        }
+        self.keep_in_cones(positions, presses);
+        many.measure(self, g, (positions, inverse));
         self.many = Some(many);
-        solved
+        Ok(true)
     }
 
     /// Takes the multipliers over. A sliding contact whose multiplier would pull gets no friction: returns whether
     /// there is any.
-    fn keep(&mut self, many: &mut ManyRows<T>, positions: &[usize], presses: T) -> bool {
-        let (mut again, mut number) = (false, 0);
-        for (&position, &multiplier) in positions.iter().zip(&many.multipliers) {
+    fn keep(&mut self, multipliers: &[T], positions: &[usize], presses: T) -> bool {
+        let mut again = false;
+        for (&position, &multiplier) in positions.iter().zip(multipliers) {
             self.totals[position] = multiplier;
             let block = &mut self.blocks[self.owners[position]];
-            if block.place != position {
-                continue;
-            }
-            let pulls = presses * multiplier < T::zero();
+            let pulls = block.place == position && presses * multiplier < T::zero();
             if pulls && block.direction.is_some_and(|direction| direction != [T::zero(); 2]) {
-                (block.direction, many.along[number], again) = (Some([T::zero(); 2]), Some([T::zero(); 2]), true);
+                (block.direction, again) = (Some([T::zero(); 2]), true);
             }
-            number += 1;
         }
         again
     }
 }
 
-impl<T: Real> ManyRows<T> {
-    /// Sets up the problem of the rows at these positions. Returns whether all its values are finite.
-    fn pose(&mut self, all: &JumpProblem<T>, g: &ContactJacobian<T>, positions: &[usize], inverse: &[T]) -> bool {
-        self.move_dofs(g, (&all.rows, positions), inverse, |position| [all.base[position], all.base[position].abs()]);
+impl<T: Real> ManyJumps<T> {
+    /// Solves for the rows at these positions. Returns whether all values are finite, and the iteration converges.
+    fn solve(
+        &mut self,
+        all: &JumpProblem<T>,
+        g: &ContactJacobian<T>,
+        (positions, inverse): (&[usize], &[T]),
+    ) -> Result<bool> {
         let Self { rows, compliance, offset, tolerance, sets, along, multipliers, moved, sizes, .. } = self;
-        for values in [&mut *compliance, offset, tolerance] {
+        let size = positions.len();
+        for values in [&mut *compliance, offset, tolerance, multipliers] {
             values.clear();
+            memory::grow(values, size, 1, WHAT)?;
+        }
+        for values in [&mut *moved, sizes] {
+            values.clear();
+            memory::grow(values, inverse.len(), 1, WHAT)?;
         }
         rows.clear();
+        memory::make_room(rows, size, WHAT)?;
         sets.clear();
+        memory::make_room(sets, size, WHAT)?;
         along.clear();
-        for &position in positions {
+        memory::make_room(along, size, WHAT)?;
+        self.move_dofs(g, (&all.rows, positions), inverse, |position| [all.base[position], all.base[position].abs()]);
+        let Self { cg, rows, compliance, offset, tolerance, sets, along, multipliers, moved, sizes } = self;
+        for (k, &position) in positions.iter().enumerate() {
             let (row, block) = (all.rows[position], &all.blocks[all.owners[position]]);
             rows.push(row);
-            offset.push(all.jump[position] - g.product(row, moved));
-            tolerance.push(all.tolerance[position] + rounding(g.magnitude(row, sizes)));
-            let is_first = block.place == position;
-            compliance.push(if is_first { block.compliance } else { T::zero() });
-            if is_first {
+            offset[k] = all.jump[position] - g.product(row, moved);
+            tolerance[k] = all.tolerance[position] + rounding(g.magnitude(row, sizes));
+            if block.place == position {
+                compliance[k] = block.compliance;
                 sets.push(block.set);
                 along.push(block.direction);
             }
         }
-        multipliers.clear();
-        multipliers.resize(positions.len(), T::zero());
-        T::all_finite(offset) && T::all_finite(compliance)
-    }
-
-    fn solve(&mut self, g: &ContactJacobian<T>, inverse: &[T]) -> bool {
-        let Self { cg, rows, compliance, offset, tolerance, sets, along, multipliers, .. } = self;
+        if !T::all_finite(offset) || !T::all_finite(compliance) {
+            return Ok(false);
+        }
         let mut product = |x: &[T], y: &mut [T]| {
             for ((y, &x), &inverse) in y.iter_mut().zip(x).zip(inverse) {
                 *y = if inverse > T::zero() { x / inverse } else { T::zero() };
             }
         };
-        let data = RowData { compliance, offset, tolerance, sets, along };
-        cg.begin();
+        let data = RowData { g, rows, compliance, offset, tolerance, sets, along };
         let patience = Patience { products: 2 * LOOKS, looks: LOOKS };
-        let mut problem = SparseProblem { product: &mut product, inverse, g, rows, data, patience };
-        cg.solve(&mut problem, multipliers).is_solved
+        cg.begin();
+        let outcome = cg.solve(&mut SparseProblem { product: &mut product, inverse, data, patience }, multipliers)?;
+        Ok(outcome.is_solved)
     }
 
     /// Computes the remaining jumps.
-    fn measure(&mut self, all: &mut JumpProblem<T>, g: &ContactJacobian<T>, positions: &[usize], inverse: &[T]) {
+    fn measure(&mut self, all: &mut JumpProblem<T>, g: &ContactJacobian<T>, (positions, inverse): (&[usize], &[T])) {
         self.move_dofs(g, (&all.rows, positions), inverse, |position| {
             let [total, base] = [all.totals[position], all.base[position]];
             [total - base, total.abs() + base.abs()]
@@ -142,8 +155,7 @@ impl<T: Real> ManyRows<T> {
     ) {
         let Self { moved, sizes, .. } = self;
         for values in [&mut *moved, sizes] {
-            values.clear();
-            values.resize(inverse.len(), T::zero());
+            values.fill(T::zero());
         }
         for &position in positions {
             let [multiplier, size] = multiplier(position);

@@ -45,8 +45,8 @@ pub(super) struct Operator {
 }
 
 impl Operator {
-    fn new(matrix: SparseColMat<usize, f64>) -> Self {
-        Self { product: Product::new(matrix.as_ref(), Symmetry::Symmetric), matrix }
+    fn new(matrix: SparseColMat<usize, f64>) -> Result<Self> {
+        Ok(Self { product: Product::new(matrix.as_ref(), Symmetry::Symmetric)?, matrix })
     }
 
     /// The products with vectors, column by column.
@@ -161,8 +161,8 @@ impl Pencil {
             relative_rounding,
             sum,
             free,
-            mass: Operator::new(mass),
-            stiffness: Operator::new(stiffness),
+            mass: Operator::new(mass)?,
+            stiffness: Operator::new(stiffness)?,
         };
         let values = pencil.shifted(shift)?;
         pencil.factor.factorize(pencil.sum.view(&values)).map_err(|error| match error {

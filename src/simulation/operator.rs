@@ -15,7 +15,7 @@ mod delassus;
 mod products;
 
 use crate::contact::{ContactJacobian, Groups, RowProducts};
-use crate::contact_solver::{Assembly, FORESEEN, MANY, Outcome, RowData};
+use crate::contact_solver::{Assembly, FORESEEN, Outcome, RowData};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::memory;
@@ -271,11 +271,10 @@ impl<T: Real> Operator<T> {
         match self.contact {
             ContactPath::Apart => {
                 delassus.begin(rows)?;
-                products.list(size, reciprocals.len(), |i| g.located(rows[i]));
+                products.list(size, reciprocals.len(), |i| g.located(rows[i]))?;
                 for (k, &j) in rows.iter().enumerate() {
-                    let response = || g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
-                    let put = |i: usize, product| delassus.values[i * size + k] = product;
-                    products.each(response, |i| g.located(rows[i]), put);
+                    let response = g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
+                    products.each(response, |i, product| delassus.values[i * size + k] = product);
                 }
             }
             ContactPath::Condensed | ContactPath::Full => {
@@ -334,14 +333,10 @@ impl<T: Real> Operator<T> {
         self.responses.respond((rows, multipliers), forces, response);
     }
 
-    /// Whether problems of so many contacts may be solved by products with A.
-    pub(crate) fn multiplies(&self, assembly: Assembly, contacts: usize) -> bool {
-        let enough = match assembly {
-            Assembly::Always => return false,
-            Assembly::Automatic => MANY,
-            Assembly::Never => 1,
-        };
-        contacts >= enough && self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric()
+    /// Whether problems of so many rows may be solved by products with A.
+    pub(crate) fn multiplies(&self, assembly: Assembly, rows: usize) -> bool {
+        let may = self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric();
+        may && rows >= assembly.least()
     }
 
     /// Solves a contact problem by products with A, unless forming W is less work or the only way. Leaves the forces
@@ -350,7 +345,6 @@ impl<T: Real> Operator<T> {
         &mut self,
         (system, h, at): (&mut dyn System<T>, f64, At<'_, T>),
         assembly: Assembly,
-        (g, rows): (&ContactJacobian<T>, &[usize]),
         data: RowData<'_, T>,
         multipliers: &mut [T],
         [forces, response]: [&mut [T]; 2],
@@ -358,6 +352,7 @@ impl<T: Real> Operator<T> {
         if data.compliance.iter().any(|c| !c.is_finite()) {
             return Ok(None);
         }
+        let RowData { g, rows, .. } = data;
         self.read_products(system, h, at)?;
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
@@ -369,7 +364,7 @@ impl<T: Real> Operator<T> {
                 None => return Ok(None),
             }
         }
-        let outcome = products.solve((&self.matrix, system), (g, rows), data, multipliers, affordable);
+        let outcome = products.solve((&self.matrix, system), data, multipliers, affordable)?;
         if outcome.is_solved {
             forces.fill(T::zero());
             for (&row, &lambda) in rows.iter().zip(&*multipliers) {
@@ -392,7 +387,10 @@ impl<T: Real> Operator<T> {
             self.matrix.assemble(system, h, at)?;
         }
         let matrix = &self.matrix;
-        let products = self.products.get_or_insert_with(|| Box::new(Products::new(matrix, system)));
+        let products = match &mut self.products {
+            Some(products) => products,
+            none => none.insert(Box::new(Products::new(matrix, system)?)),
+        };
         products.read(matrix, system, h)?;
         if products.is_packed && !self.varies() {
             self.matrix.free_values();

@@ -28,9 +28,9 @@ pub(crate) enum Product<T> {
 }
 
 impl<T: Real> Product<T> {
-    pub(crate) fn new(a: SparseColMatRef<'_, usize, T>, symmetry: Symmetry) -> Self {
+    pub(crate) fn new(a: SparseColMatRef<'_, usize, T>, symmetry: Symmetry) -> Result<Self> {
         if symmetry == Symmetry::General {
-            return Self::General;
+            return Ok(Self::General);
         }
         let n = a.ncols();
         let tridiagonal = |j: usize| {
@@ -40,14 +40,15 @@ impl<T: Real> Product<T> {
         if (0..n).all(tridiagonal) {
             let diagonal = (0..n).map(|j| super::entry(a, j, j)).collect();
             let beside = (1..n).map(|j| super::entry(a, j, j - 1)).collect();
-            return Self::Tridiagonal { diagonal, beside };
+            return Ok(Self::Tridiagonal { diagonal, beside });
         }
         Self::of_symmetric(a.symbolic())
     }
 
     /// For all symmetric matrices of a pattern.
-    pub(crate) fn of_symmetric(pattern: SymbolicSparseColMatRef<'_, usize>) -> Self {
-        Supervariables::find(pattern).map_or(Self::Rows, |found| Self::Supervariables(Box::new(found)))
+    pub(crate) fn of_symmetric(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Self> {
+        let found = Supervariables::find(pattern)?;
+        Ok(found.map_or(Self::Rows, |found| Self::Supervariables(Box::new(found))))
     }
 
     /// Packs the entries of a matrix that is too large for a cache: products then read half as much, and the matrix
@@ -148,16 +149,19 @@ impl<T: Real> Supervariables<T> {
     const MOST_PARTS: usize = 8;
 
     /// `None` if they bring no gain, or if the matrix is too large for 32 bits.
-    fn find(pattern: SymbolicSparseColMatRef<'_, usize>) -> Option<Self> {
+    fn find(pattern: SymbolicSparseColMatRef<'_, usize>) -> Result<Option<Self>> {
+        const WHAT: &str = "the supervariables of a matrix";
         let n = pattern.ncols();
-        u32::try_from(pattern.row_idx().len()).ok()?;
+        if u32::try_from(pattern.row_idx().len()).is_err() {
+            return Ok(None);
+        }
         #[allow(clippy::cast_possible_truncation)] // checked above
         let index = |i: usize| i as u32;
-        let (mut all, mut groups) = (Vec::with_capacity(n / 2), Vec::new());
+        let (mut all, mut groups) = (memory::reserve(n / 2, 1, WHAT)?, Vec::new());
         let mut column = 0;
         while column < n {
             let rows = pattern.row_idx_of_col_raw(column);
-            let place = rows.binary_search(&column).ok()?;
+            let Ok(place) = rows.binary_search(&column) else { return Ok(None) };
             let alike = |other: &usize| {
                 rows.get(place + other - column) == Some(other) && pattern.row_idx_of_col_raw(*other) == rows
             };
@@ -167,22 +171,24 @@ impl<T: Real> Supervariables<T> {
             let group = if below.chunks(width).all(whole) { width } else { 1 };
             #[allow(clippy::cast_possible_truncation)] // at most three
             let [width_, group_] = [width as u8, group as u8];
+            memory::make_room(&mut all, 2, WHAT)?;
+            memory::make_room(&mut groups, below.len(), WHAT)?;
             all.push(Supervariable { column: index(column), width: width_, group: group_, first: index(groups.len()) });
             groups.extend(below.iter().step_by(group).map(|&row| index(row)));
             column += width;
         }
         if n as f64 <= Self::WORTHWHILE * all.len() as f64 {
-            return None;
+            return Ok(None);
         }
         all.push(Supervariable { column: index(n), width: 0, group: 0, first: index(groups.len()) });
         all.shrink_to_fit();
         groups.shrink_to_fit();
-        let parts = Self::parts(pattern, &all);
-        Some(Self { all, groups, parts, packed: Vec::new() })
+        let parts = Self::parts(pattern, &all)?;
+        Ok(Some(Self { all, groups, parts, packed: Vec::new() }))
     }
 
     /// Parts with similar numbers of entries; a single one if they would contribute to many rows of each other.
-    fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, all: &[Supervariable]) -> Vec<Part<T>> {
+    fn parts(pattern: SymbolicSparseColMatRef<'_, usize>, all: &[Supervariable]) -> Result<Vec<Part<T>>> {
         let n = pattern.ncols();
         let pointers = pattern.col_ptr();
         let wanted = (pointers[n] / Self::GRAIN).clamp(1, Self::MOST_PARTS);
@@ -199,12 +205,13 @@ impl<T: Real> Supervariables<T> {
             let reach = columns.clone().filter_map(|j| pattern.row_idx_of_col_raw(j).last()).max();
             let rows = reach.map_or(columns.end, |row| columns.end.max(row + 1)) - columns.start;
             behind += rows - columns.len();
-            parts.push(Part { supervariables, columns, sums: vec![T::zero(); rows], packed: 0 });
+            let sums = memory::zeros(rows, 1, "the sums of a product")?;
+            parts.push(Part { supervariables, columns, sums, packed: 0 });
         }
         if parts.len() == 1 || behind > n {
-            return vec![Part { supervariables: 0..all.len() - 1, columns: 0..n, sums: Vec::new(), packed: 0 }];
+            return Ok(vec![Part { supervariables: 0..all.len() - 1, columns: 0..n, sums: Vec::new(), packed: 0 }]);
         }
-        parts
+        Ok(parts)
     }
 
     /// Copies the entries of a matrix at and below the diagonal.
@@ -330,7 +337,7 @@ mod tests {
             [vec![3; 20], vec![2; 31], vec![6; 9], vec![5; 9], vec![4; 9], vec![3, 1, 2, 3, 3, 2, 6, 1, 1, 2, 3]]
         {
             let a = matrix(&dofs, coupled);
-            let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+            let mut product = Product::new(a.as_ref(), Symmetry::Symmetric).unwrap();
             assert!(matches!(product, Product::Supervariables(_)), "{dofs:?}");
             check(&a, &mut product);
         }
@@ -340,7 +347,7 @@ mod tests {
     #[test]
     fn groups_of_rows_that_are_no_nodes() {
         let a = matrix(&[3, 2, 3], |_, q| q == 0);
-        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric).unwrap();
         let Product::Supervariables(found) = &product else { panic!("dofs go together") };
         let all = &found.all;
         assert!(all[0].width == 3 && all[0].group == 1);
@@ -351,15 +358,15 @@ mod tests {
     fn chains_and_single_dofs_go_row_by_row() {
         for n in [1, 2, 3, 40] {
             let chain = matrix(&vec![1; n], |p, q| p - q == 1 && p != n / 2);
-            let mut product = Product::new(chain.as_ref(), Symmetry::Symmetric);
+            let mut product = Product::new(chain.as_ref(), Symmetry::Symmetric).unwrap();
             assert!(matches!(product, Product::Tridiagonal { .. }));
             check(&chain, &mut product);
         }
         let net = matrix(&[1; 50], |p, q| (p + q) % 7 == 0);
-        let mut product = Product::new(net.as_ref(), Symmetry::Symmetric);
+        let mut product = Product::new(net.as_ref(), Symmetry::Symmetric).unwrap();
         assert!(matches!(product, Product::Rows));
         check(&net, &mut product);
-        check(&net, &mut Product::new(net.as_ref(), Symmetry::General));
+        check(&net, &mut Product::new(net.as_ref(), Symmetry::General).unwrap());
     }
 
     /// Large matrices are multiplied in several parts if dofs are numbered along the body, otherwise in one.
@@ -367,7 +374,7 @@ mod tests {
     fn parts_of_a_large_matrix_add_up() {
         let band = |p: usize, q: usize| p - q < 14;
         let a = matrix(&vec![3; 4500], band);
-        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric);
+        let mut product = Product::new(a.as_ref(), Symmetry::Symmetric).unwrap();
         let Product::Supervariables(found) = &product else { panic!("dofs go together") };
         let parts = &found.parts;
         assert!(parts.len() > 1 && parts.iter().all(|part| !part.sums.is_empty()));
@@ -375,7 +382,7 @@ mod tests {
 
         let scattered = |p: usize| crate::sparse::scattered(p) % 4500;
         let far = matrix(&vec![3; 4500], |p, q| scattered(p).abs_diff(scattered(q)) < 14);
-        let mut product = Product::new(far.as_ref(), Symmetry::Symmetric);
+        let mut product = Product::new(far.as_ref(), Symmetry::Symmetric).unwrap();
         let Product::Supervariables(found) = &product else { panic!("dofs go together") };
         let parts = &found.parts;
         assert!(parts.len() == 1 && far.val().len() > 4 * Supervariables::<f64>::GRAIN);

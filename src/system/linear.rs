@@ -131,7 +131,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
             });
         }
         same_size("stiffness matrix", n, stiffness.as_ref())?;
-        let mut product = Product::new(stiffness.as_ref(), sparse::symmetry("stiffness", stiffness.as_ref())?);
+        let mut product = Product::new(stiffness.as_ref(), sparse::symmetry("stiffness", stiffness.as_ref())?)?;
         product.pack_large(stiffness.as_ref())?;
         Ok(Self {
             mass,
@@ -154,7 +154,7 @@ impl<'a, T: Real> LinearSystem<'a, T> {
     /// [`Error::Dimension`], [`Error::MatrixNotFinite`], [`Error::Asymmetric`] for a C of one triangle.
     pub fn damping(mut self, damping: SparseColMat<usize, T>) -> Result<Self> {
         same_size("damping matrix", self.dofs(), damping.as_ref())?;
-        let product = Product::new(damping.as_ref(), sparse::symmetry("damping", damping.as_ref())?);
+        let product = Product::new(damping.as_ref(), sparse::symmetry("damping", damping.as_ref())?)?;
         self.union = Some(Combination::new(self.dofs(), &[], &[self.stiffness.symbolic(), damping.symbolic()])?);
         self.damping = StoredDamping::General(damping, product);
         Ok(self)

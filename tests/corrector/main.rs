@@ -5,6 +5,7 @@ mod nonsmooth;
 mod of_a_host;
 mod papers;
 mod persistency;
+mod projection;
 mod release;
 mod restitution;
 mod work_balance;

@@ -1,8 +1,12 @@
 //! N = G D⁻¹ Gᵀ + c of the closed rows: the Delassus operator of a body whose dofs do not move one another.
 
+use super::WHAT;
 use super::rows::Rows;
 use super::statuses::{Role, Statuses};
+use crate::contact::RowProducts;
+use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver};
+use crate::memory;
 use crate::real::Real;
 use crate::rounding::rounding;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
@@ -26,11 +30,7 @@ pub(super) struct Metric<T> {
     /// Which rows the factor takes as closed, with their compliances.
     closed: Vec<Option<T>>,
     right: Vec<T>,
-    /// For each dof the rows that act on it, with their weights, and a row of N.
-    lists: Vec<usize>,
-    acting: Vec<(usize, T)>,
-    sums: Vec<T>,
-    touched: Vec<usize>,
+    products: RowProducts<T>,
 }
 
 /// The largest value of a closed row beyond its tolerance, and the largest sum of magnitudes, both over √N_ii.
@@ -92,23 +92,22 @@ impl<T: Real> Metric<T> {
         self.diagonal[row]
     }
 
-    /// λᵀ G D⁻¹ Gᵀ λ.
-    pub(super) fn square(&self, multipliers: &[T]) -> T {
+    /// The size of forces Gᵀ λ, in the norm of D⁻¹.
+    pub(super) fn norm(&self, multipliers: &[T]) -> T {
         let column = |j: usize| self.starts[j]..self.starts[j + 1];
         let product = |j: usize| {
             let terms = self.places[column(j)].iter().zip(&self.values[column(j)]);
             terms.map(|(&i, &value)| value * multipliers[i]).sum::<T>()
         };
-        multipliers.iter().enumerate().filter(|(_, x)| **x != T::zero()).map(|(j, &x)| x * product(j)).sum()
+        let terms = multipliers.iter().enumerate().filter(|(_, x)| **x != T::zero());
+        terms.map(|(j, &x)| x * product(j)).sum::<T>().max(T::zero()).sqrt()
     }
 
     /// Forms and factorizes N, as far as needed. Returns whether it could be factorized.
-    pub(super) fn follow(&mut self, rows: &Rows<T>, statuses: &Statuses<T>, inverse: &[T]) -> bool {
+    pub(super) fn follow(&mut self, rows: &Rows<T>, statuses: &Statuses<T>, inverse: &[T]) -> Result<bool> {
         if self.is_old {
             self.closed.clear();
-            if self.form(rows, inverse).is_none() {
-                return false;
-            }
+            self.form(rows, inverse)?;
             (self.is_old, self.is_near) = (false, false);
         }
         let differs = |row: usize, own: T| match (statuses.roles[row], self.closed[row]) {
@@ -118,32 +117,36 @@ impl<T: Real> Metric<T> {
         };
         let mut own = statuses.compliance.iter().enumerate();
         if self.closed.len() == rows.len() && !own.any(|(row, &own)| differs(row, own)) {
-            return true;
+            return Ok(true);
         }
         let closes = |row: usize| statuses.roles[row] == Role::Closed;
         self.closed.clear();
+        memory::make_room(&mut self.closed, rows.len(), WHAT)?;
         self.closed.extend((0..rows.len()).map(|row| closes(row).then(|| statuses.compliance[row])));
-        self.factorize().is_some()
+        let found = self.factorize();
+        if found.is_err() {
+            self.closed.clear();
+        }
+        match found {
+            Err(error @ Error::OutOfMemory { .. }) => Err(error),
+            found => Ok(found.is_ok()),
+        }
     }
 
-    fn factorize(&mut self) -> Option<()> {
+    fn factorize(&mut self) -> Result<()> {
         let Self { starts, places, values, diagonal, factor, analyzed, factorized, closed, right, .. } = self;
         let size = diagonal.len();
-        right.resize(size, T::zero());
+        memory::grow(right, size, 1, WHAT)?;
         factorized.clear();
+        memory::make_room(factorized, values.len(), WHAT)?;
         for j in 0..size {
             let column = starts[j]..starts[j + 1];
             factorized.extend(places[column.clone()].iter().zip(&values[column]).map(|(&i, &value)| {
                 match (i == j, closed[i], closed[j]) {
                     (true, Some(own), _) => value + T::of(SHIFT).max(T::epsilon()) * value + own,
                     // An open row is an equation of its own.
-                    (true, None, _) => {
-                        if value > T::zero() {
-                            value
-                        } else {
-                            T::one()
-                        }
-                    }
+                    (true, None, _) if value > T::zero() => value,
+                    (true, None, _) => T::one(),
                     (false, Some(_), Some(_)) => value,
                     (false, ..) => T::zero(),
                 }
@@ -151,71 +154,48 @@ impl<T: Real> Metric<T> {
         }
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, starts, None, places);
         let [known_starts, known_places] = analyzed;
-        if factor.is_none() || known_starts != starts || known_places != places {
-            *factor = Some(Automatic.analyze(pattern, &[]).ok()?);
-            known_starts.clone_from(starts);
-            known_places.clone_from(places);
-        }
-        let found = factor.as_mut()?.factorize(SparseColMatRef::new(pattern, factorized));
-        if found.is_err() {
-            closed.clear();
-        }
-        found.ok()
+        let factor = match factor {
+            Some(factor) if known_starts == starts && known_places == places => factor,
+            _ => {
+                known_starts.clear();
+                let analyzed = factor.insert(Automatic.analyze(pattern, &[])?);
+                memory::copy(known_places, places, WHAT)?;
+                memory::copy(known_starts, starts, WHAT)?;
+                analyzed
+            }
+        };
+        factor.factorize(SparseColMatRef::new(pattern, factorized))
     }
 
-    /// G D⁻¹ Gᵀ of all rows, if there is memory for it.
-    fn form(&mut self, rows: &Rows<T>, inverse: &[T]) -> Option<()> {
-        let Self { starts, places, values, diagonal, lists, acting, sums, touched, .. } = self;
+    /// G D⁻¹ Gᵀ of all rows.
+    fn form(&mut self, rows: &Rows<T>, inverse: &[T]) -> Result<()> {
+        let Self { starts, places, values, diagonal, products, .. } = self;
         let (size, dofs) = (rows.len(), inverse.len() - rows.len());
-        // Counts become starts, and starts of the next dof as lists are filled.
-        lists.clear();
-        lists.resize(dofs + 2, 0);
-        (0..size).flat_map(|i| rows.row(i)).for_each(|(dof, _)| lists[dof + 2] += 1);
-        (2..lists.len()).for_each(|dof| lists[dof] += lists[dof - 1]);
-        acting.clear();
-        acting.resize(lists[dofs + 1], (0, T::zero()));
-        for i in 0..size {
-            for (dof, weight) in rows.row(i) {
-                acting[lists[dof + 1]] = (i, weight);
-                lists[dof + 1] += 1;
-            }
-        }
-        for list in [&mut *starts, places] {
-            list.clear();
-        }
+        products.list(size, dofs, |row| rows.row(row))?;
+        starts.clear();
+        places.clear();
         values.clear();
         diagonal.clear();
-        sums.clear();
-        sums.resize(size, T::zero());
+        memory::make_room(starts, size + 1, WHAT)?;
+        memory::make_room(diagonal, size, WHAT)?;
         starts.push(0);
-        let untouched = usize::MAX;
-        let mut seen = std::mem::take(touched);
-        seen.clear();
-        seen.resize(size, untouched);
         for j in 0..size {
             let first = places.len();
-            places.try_reserve(size).ok()?;
-            values.try_reserve(size).ok()?;
-            seen[j] = j;
-            places.push(j);
-            for (dof, weight) in rows.row(j) {
-                let scaled = weight * inverse[dof];
-                for &(i, other) in &acting[lists[dof]..lists[dof + 1]] {
-                    if seen[i] != j {
-                        seen[i] = j;
-                        places.push(i);
-                    }
-                    sums[i] += scaled * other;
-                }
+            memory::make_room(places, size, WHAT)?;
+            memory::make_room(values, size, WHAT)?;
+            products.each(rows.row(j).map(|(dof, weight)| (dof, weight * inverse[dof])), |i, product| {
+                places.push(i);
+                values.push(product);
+            });
+            let own = places[first..].binary_search(&j);
+            if let Err(at) = own {
+                places.insert(first + at, j);
+                values.insert(first + at, T::zero());
             }
-            places[first..].sort_unstable();
-            values.extend(places[first..].iter().map(|&i| std::mem::replace(&mut sums[i], T::zero())));
+            diagonal.push(values[first + own.unwrap_or_else(|at| at)]);
             starts.push(places.len());
-            let own = places[first..].binary_search(&j).map_or(T::zero(), |at| values[first + at]);
-            diagonal.push(own);
         }
-        *touched = seen;
-        Some(())
+        Ok(())
     }
 
     /// Removes from a residual of the norm `size` what the closed rows can carry: r −= Gᵀ l and λ −= l, so that

@@ -4,8 +4,11 @@
 //! more, across the slip: friction turns with the slip there, as if the row had the compliance |slip| / (μ p). Both are
 //! given anew at each look: normal forces depend little on the friction of the same step.
 
+use super::WHAT;
 use super::metric::Metric;
 use super::rows::{Block, Rows};
+use crate::error::Result;
+use crate::memory;
 use crate::real::Real;
 use crate::rounding::projected_residual;
 use std::ops::Range;
@@ -19,13 +22,6 @@ pub(super) enum Role {
     Closed,
     /// λ is given: friction along the slip.
     Given,
-}
-
-/// Whether the equations differ from the equations that were solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Change {
-    None,
-    Some,
 }
 
 /// The status of each row, in the tangents of [`Rows`].
@@ -54,14 +50,14 @@ const SAME: f64 = 16.0;
 impl<T: Real> Statuses<T> {
     /// Before the first solution: rows are closed that are violated or equations, or carry a force in the guess; no
     /// contact slides.
-    pub(super) fn begin(&mut self, rows: &Rows<T>, guess: &[T]) {
+    pub(super) fn begin(&mut self, rows: &Rows<T>, guess: &[T]) -> Result<()> {
         let Self { roles, multipliers, compliance, looks } = self;
         *looks = 0;
-        compliance.clear();
-        compliance.extend_from_slice(&rows.compliance);
+        memory::copy(compliance, &rows.compliance, WHAT)?;
         multipliers.clear();
-        multipliers.resize(rows.len(), T::zero());
+        memory::grow(multipliers, rows.len(), 1, WHAT)?;
         roles.clear();
+        memory::make_room(roles, rows.len(), WHAT)?;
         for Block { first, set, along, .. } in rows.blocks.iter().copied() {
             let pressed = guess[first] > T::zero() && set.friction().is_none();
             let is_closed = set.is_bilateral() || pressed || rows.offset[first] < T::zero();
@@ -70,6 +66,7 @@ impl<T: Real> Statuses<T> {
             let of_tangents = if along.is_some() || !is_closed { Role::Given } else { role };
             roles.extend(std::iter::repeat_n(of_tangents, set.rows() - 1));
         }
+        Ok(())
     }
 
     /// The same statuses for rows linearized elsewhere.
@@ -81,14 +78,14 @@ impl<T: Real> Statuses<T> {
     }
 
     /// Decides anew from the present multipliers and x, of which the last entries are the displacements of compliant
-    /// rows.
-    pub(super) fn update(&mut self, rows: &mut Rows<T>, x: &mut [T], metric: &mut Metric<T>) -> Change {
+    /// rows. Returns whether the equations differ from those that were solved.
+    pub(super) fn update(&mut self, rows: &mut Rows<T>, x: &mut [T], metric: &mut Metric<T>) -> bool {
         let share = projected_residual::<T>();
         let scaled = |lambda: T, row: usize, metric: &Metric<T>| lambda * metric.diagonal(row).sqrt();
         let scaled_sizes = (0..rows.len()).map(|row| scaled(self.multipliers[row], row, metric).abs());
         let largest = scaled_sizes.fold(T::zero(), T::max);
         let widest = T::largest(&rows.offset);
-        let mut change = Change::None;
+        let mut change = false;
         self.looks += 1;
         for at in 0..rows.blocks.len() {
             let Block { first, set, along, .. } = rows.blocks[at];
@@ -102,7 +99,7 @@ impl<T: Real> Statuses<T> {
             let rubs = |row: usize| self.roles[row] == Role::Closed || self.multipliers[row] != T::zero();
             let was_closed = self.roles[first] == Role::Closed;
             if closes != was_closed {
-                change = Change::Some;
+                change = true;
                 if self.waits(at) {
                     continue;
                 }
@@ -116,14 +113,14 @@ impl<T: Real> Statuses<T> {
             if let Some(along) = along {
                 let small = |row: usize| share * largest / metric.diagonal(row).sqrt();
                 for (row, along) in tangents.zip(along) {
-                    if self.give(row, along * self.multipliers[first], small(row)) == Change::Some {
-                        change = Change::Some;
+                    if self.give(row, along * self.multipliers[first], small(row)) {
+                        change = true;
                     }
                 }
             } else if closes && let Some(friction) = set.friction() {
                 let radius = T::of(friction) * lambda.max(T::zero());
-                if self.slide(at, radius, share * largest, (rows, x, metric)) == Change::Some {
-                    change = Change::Some;
+                if self.slide(at, radius, share * largest, (rows, x, metric)) {
+                    change = true;
                 }
             }
         }
@@ -150,18 +147,18 @@ impl<T: Real> Statuses<T> {
     }
 
     /// Decides whether a closed contact sticks or slides, with the radius μ p of its disc of friction. `small` is a
-    /// force over √N_ii that counts as rounding.
+    /// force over √N_ii that counts as rounding. Returns whether the equations differ from those that were solved.
     fn slide(
         &mut self,
         at: usize,
         radius: T,
         small: T,
         (rows, x, metric): (&mut Rows<T>, &mut [T], &mut Metric<T>),
-    ) -> Change {
+    ) -> bool {
         let (tangents, dofs) = (rows.blocks[at].tangents(), x.len() - rows.len());
         let own = tangents.clone().map(|row| metric.diagonal(row)).fold(T::zero(), T::max);
         if own <= T::zero() {
-            return Change::None;
+            return false;
         }
         let small = small / own.sqrt();
         let slides = self.roles[tangents.start] == Role::Given;
@@ -177,16 +174,16 @@ impl<T: Real> Statuses<T> {
         let sticks = if slides { size <= radius } else { size <= radius + T::of(BEYOND) * radius + small };
         if sticks {
             if slides && self.waits(at) {
-                return Change::Some;
+                return true;
             }
             if slides {
                 self.set(tangents.clone(), Role::Closed, tangents, x);
-                return Change::Some;
+                return true;
             }
-            return Change::None;
+            return false;
         }
         if !slides && self.waits(at) {
-            return Change::Some;
+            return true;
         }
         let mut along = trial.map(|trial| trial / size);
         let slipped = slip[0].hypot(slip[1]);
@@ -200,7 +197,7 @@ impl<T: Real> Statuses<T> {
         }
         let mut change = self.give(tangents.start, radius * along[0], small);
         if !slides {
-            change = Change::Some;
+            change = true;
         }
         if tangents.len() == 2 {
             let row = tangents.start + 1;
@@ -211,11 +208,11 @@ impl<T: Real> Statuses<T> {
                 self.compliance[row] = compliance;
                 x[dofs + row] = compliance * self.multipliers[row];
                 if moved.abs() > T::of(SAME) * small * own {
-                    change = Change::Some;
+                    change = true;
                 }
             } else {
-                if self.give(row, T::zero(), small) == Change::Some {
-                    change = Change::Some;
+                if self.give(row, T::zero(), small) {
+                    change = true;
                 }
                 (self.compliance[row], x[dofs + row]) = (T::zero(), T::zero());
             }
@@ -223,10 +220,10 @@ impl<T: Real> Statuses<T> {
         change
     }
 
-    /// Gives the friction of a row. A change by a few times `small` is none.
-    fn give(&mut self, row: usize, given: T, small: T) -> Change {
+    /// Gives the friction of a row. Returns whether it differs by more than a few times `small`.
+    fn give(&mut self, row: usize, given: T, small: T) -> bool {
         let moved = (self.multipliers[row] - given).abs();
         (self.roles[row], self.multipliers[row]) = (Role::Given, given);
-        if moved > T::of(SAME) * small { Change::Some } else { Change::None }
+        moved > T::of(SAME) * small
     }
 }

@@ -1,9 +1,9 @@
 //! Contact problems solved by products with the effective matrix, without W.
 
-use crate::contact::ContactJacobian;
 use crate::contact_solver::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
 use crate::mass::Mass;
+use crate::memory;
 use crate::real::Real;
 use crate::rounding::projected_residual;
 use crate::simulation::operator::matrix::EffectiveMatrix;
@@ -39,17 +39,16 @@ const MANY_PRODUCTS: usize = 64;
 const FEW_PRODUCTS: usize = 24;
 
 impl<T: Real> Products<T> {
-    pub(super) fn new(matrix: &EffectiveMatrix<T>, system: &dyn System<T>) -> Self {
-        let product = Product::of_symmetric(matrix.view(system).symbolic());
-        Self {
-            product,
+    pub(super) fn new(matrix: &EffectiveMatrix<T>, system: &dyn System<T>) -> Result<Self> {
+        Ok(Self {
+            product: Product::of_symmetric(matrix.view(system).symbolic())?,
             is_packed: false,
             entries: 0,
             inverse: Vec::new(),
             expected: 0,
             cg: ProjectedCg::default(),
             is_current: false,
-        }
+        })
     }
 
     /// Reads a matrix.
@@ -59,6 +58,7 @@ impl<T: Real> Products<T> {
         self.entries = a.val().len().midpoint(a.ncols());
         let (mut whole, mut mass) = (0.0, 0.0);
         self.inverse.clear();
+        memory::make_room(&mut self.inverse, a.ncols(), "the diagonal of the effective matrix")?;
         self.inverse.extend((0..a.ncols()).map(|dof| {
             let at = a.row_idx_of_col_raw(dof).binary_search(&dof).ok();
             let (Some(at), Err(_)) = (at, system.prescribed().binary_search(&dof)) else { return T::zero() };
@@ -99,11 +99,10 @@ impl<T: Real> Products<T> {
     pub(super) fn solve(
         &mut self,
         (matrix, system): (&EffectiveMatrix<T>, &dyn System<T>),
-        (g, rows): (&ContactJacobian<T>, &[usize]),
         data: RowData<'_, T>,
         multipliers: &mut [T],
         affordable: usize,
-    ) -> Outcome {
+    ) -> Result<Outcome> {
         let Self { product, is_packed, inverse, expected, cg, .. } = self;
         let mut multiply = |x: &[T], y: &mut [T]| match *is_packed {
             true => product.write_packed(x, y),
@@ -111,7 +110,7 @@ impl<T: Real> Products<T> {
         };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS };
-        let mut problem = SparseProblem { product: &mut multiply, inverse, g, rows, data, patience };
+        let mut problem = SparseProblem { product: &mut multiply, inverse, data, patience };
         cg.solve(&mut problem, multipliers)
     }
 

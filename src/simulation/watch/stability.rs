@@ -224,7 +224,7 @@ impl<'s, T: Real> Stiffness<'s, T> {
             let weights = TangentWeights { stiffness: T::one(), damping: T::zero() };
             system.tangent(at.t, &at.u, &at.v, weights, &mut values)?;
             let k = SparseColMatRef::new(system.pattern(), &values[..]);
-            let product = Product::new(k, sparse::symmetry("stiffness", k).unwrap_or(Symmetry::General));
+            let product = Product::new(k, sparse::symmetry("stiffness", k).unwrap_or(Symmetry::General))?;
             return Ok(Some(Self::Matrix { values, product }));
         }
         let size = match system.linearity() {

@@ -130,7 +130,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
     /// Returns the number of products.
     fn solve_by_products(&mut self) -> Result<Option<usize>> {
         let assembly = self.solver.assembly();
-        if !self.operator.multiplies(assembly, self.contact.rows.problem.sets.len()) {
+        if !self.operator.multiplies(assembly, self.contact.rows.problem.rows.len()) {
             return Ok(None);
         }
         self.guess_multipliers();
@@ -146,8 +146,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let solved = operator.solve_by_products(
             (&mut *host.system, clock.h, at),
             assembly,
-            (curved.forces(g), rows),
-            RowData { compliance: own, offset, tolerance, sets, along: &[] },
+            RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[] },
             multipliers,
             [problem_forces, response],
         )?;
