@@ -24,7 +24,11 @@ fn contacts_with_a_prescribed_dof_in_common() {
             projection.close(&g, &[0, 1]).unwrap();
             let mut impulses = [0.0; 2];
             projection.remove_jump(&g, &[0.0; 2], &mut v, &mut impulses).unwrap();
-            assert_eq!((v, impulses), ([1.0; 3], [-4.0; 2]), "plate {plate}, node first: {node_first}");
+            let near = |x: &[f64], wanted: f64| x.iter().all(|x| (x - wanted).abs() < 1e-14);
+            assert!(
+                near(&v, 1.0) && near(&impulses, -4.0),
+                "plate {plate}, node first: {node_first}: {v:?} {impulses:?}"
+            );
         }
     }
 }
