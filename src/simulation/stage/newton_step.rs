@@ -117,6 +117,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         newton.d.fill(T::zero());
         newton.report.clear();
         newton.residuals.clear();
+        // A resumed run does not know the contact forces of the stage before: the first residual is without them.
+        self.contact.interface.forces.fill(T::zero());
         let StageVectors { balance, supports, .. } = &mut *self.vectors;
         let prescribed = &supports.dofs;
         let complete = |rows: &ScaledRows<T>, a: &mut [T], supports: &[[T; 3]]| {

@@ -228,8 +228,8 @@ fn correction(random: &mut Congruential) -> Correction {
 }
 
 fn contact_solver(random: &mut Congruential) -> Contacting {
-    use Contacting::{Default, GaussSeidel, Pivoting, ProjectedGradient};
-    pick(&[Default, Default, Default, Default, Default, Pivoting, Pivoting, GaussSeidel, ProjectedGradient], random)
+    use Contacting::{Default, GaussSeidel, Pivoting, ProjectedGradient, WithoutW};
+    pick(&[Default, Default, Default, Default, WithoutW, WithoutW, Pivoting, GaussSeidel, ProjectedGradient], random)
 }
 
 fn linear_solver(kind: &str, random: &mut Congruential) -> Solving {
@@ -260,8 +260,8 @@ fn control(way: f64, random: &mut Congruential) -> Control {
 fn twin(recipe: &Recipe, random: &mut Congruential) -> Twin {
     let mut powers = |most: f64| [0, 0, 0].map(|_: i32| random.within(-most, most + 1.0).floor() as i32);
     let (mut two, ten) = (powers(if recipe.precision == Precision::Single { 4.0 } else { 20.0 }), powers(3.0));
-    // Roots of masses are factors; lengths of power laws have exponents that are no whole numbers.
-    two[1] *= 2;
+    // Roots of masses and of M/h or C are factors; lengths of power laws have exponents that are no whole numbers.
+    (two[1], two[2]) = (2 * two[1], two[2] & !1);
     if recipe.rows.iter().any(|row| matches!(row.law, ContactLaw::PowerLaw { .. })) {
         two[0] = 0;
     }
@@ -270,8 +270,7 @@ fn twin(recipe: &Recipe, random: &mut Congruential) -> Twin {
         // (Ones on the diagonal of prescribed dofs have no unit.)
         two = [two[0], 0, 0];
     }
-    let is_direct = !matches!(recipe.contact_solver, Contacting::GaussSeidel | Contacting::ProjectedGradient)
-        && recipe.linear_solver != Solving::ConjugateGradients;
+    let is_direct = !recipe.contact_solver.iterates() && recipe.linear_solver != Solving::ConjugateGradients;
     // With friction, and with rows that follow from others, there may be more than one solution; of rows that touch at
     // the start without pressing rounding decides which open.
     let count = |holds: fn(&Row) -> bool| recipe.rows.iter().filter(|row| holds(row)).count();

@@ -153,6 +153,15 @@ pub enum Contacting {
     Pivoting,
     GaussSeidel,
     ProjectedGradient,
+    /// Projected conjugate gradients wherever they are possible.
+    WithoutW,
+}
+
+impl Contacting {
+    /// Whether the solution is as accurate as an iteration is ended.
+    pub fn iterates(self) -> bool {
+        matches!(self, Self::GaussSeidel | Self::ProjectedGradient | Self::WithoutW)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

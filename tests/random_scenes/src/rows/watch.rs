@@ -1,6 +1,6 @@
 //! What must hold in every step, and after one that is refused.
 
-use super::recipe::{Contacting, Precision, Recipe, Row, Solving};
+use super::recipe::{Precision, Recipe, Row, Solving};
 use super::run::{Finding, Run, Verdict, named};
 use contact_dynamics::contact::ContactLaw;
 use contact_dynamics::{Error, History, Real, Simulation, State};
@@ -148,8 +148,8 @@ impl<'a> Watch<'a> {
             product + (row.gap.abs() + row.amplitude.abs()) * self.recipe.units[0]
         };
         // (What iterates is accurate for the largest row.)
-        let iterates = matches!(self.recipe.contact_solver, Contacting::GaussSeidel | Contacting::ProjectedGradient)
-            || self.recipe.rows.iter().any(|row| row.friction.is_some());
+        let iterates =
+            self.recipe.contact_solver.iterates() || self.recipe.rows.iter().any(|row| row.friction.is_some());
         let largest = self.recipe.rows.iter().map(size).fold(0.0, f64::max);
         // (That of a problem with friction may be a slip.)
         let slips = self.recipe.rows.iter().filter_map(|row| row.friction.as_ref()).flat_map(|(_, tangents)| tangents);
