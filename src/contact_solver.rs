@@ -66,7 +66,7 @@ pub enum Assembly {
     /// Always.
     Always,
     /// Never: a problem of which the iteration does not converge is an error. Contacts whose force is known, contacts
-    /// on dofs without mass, unsymmetric matrices and diagonal ones have W in any case.
+    /// on dofs without mass or with prescribed dofs alone, unsymmetric matrices and diagonal ones have W in any case.
     Never,
 }
 

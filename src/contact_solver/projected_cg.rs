@@ -107,7 +107,7 @@ impl<T: Real> ProjectedCg<T> {
 
     /// Solves for the multipliers, which contain a guess of the closed rows without friction.
     pub(crate) fn solve(&mut self, problem: &mut SparseProblem<'_, T>, multipliers: &mut [T]) -> Result<Outcome> {
-        let mut outcome = Outcome { products: 0, residual: f64::NAN, is_solved: false };
+        let mut outcome = Outcome { products: 0, residual: 1.0, is_solved: false };
         self.take(problem, multipliers)?;
         let mut scale = T::zero();
         while outcome.products < problem.patience.products && self.statuses.looks < problem.patience.looks {

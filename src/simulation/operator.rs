@@ -349,10 +349,11 @@ impl<T: Real> Operator<T> {
         multipliers: &mut [T],
         [forces, response]: [&mut [T]; 2],
     ) -> Result<Option<Outcome>> {
-        if data.compliance.iter().any(|c| !c.is_finite()) {
+        let RowData { g, rows, .. } = data;
+        let responds = |&row: &usize| g.located(row).next().is_some();
+        if data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
             return Ok(None);
         }
-        let RowData { g, rows, .. } = data;
         self.read_products(system, h, at)?;
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;

@@ -51,9 +51,10 @@ impl<T: Real> Miss<T> {
     }
 }
 
-/// Added to the diagonal of N, as a share of it: rows may depend on one another. Repeated projections remove its
-/// effect. Rows of two surfaces that lie on each other may have eigenvalues down to 1e-8.
+/// Added to the diagonal of N, as a share of it, and at least `ROUNDINGS`: rows may depend on one another. Repeated
+/// projections remove its effect. Rows of two surfaces that lie on each other may have eigenvalues down to 1e-8.
 const SHIFT: f64 = 1e-10;
+const ROUNDINGS: f64 = 16.0;
 
 /// The change of a compliance, as a share of the diagonal, from which on N is factorized again.
 const ANOTHER: f64 = 1e-3;
@@ -136,6 +137,7 @@ impl<T: Real> Metric<T> {
     fn factorize(&mut self) -> Result<()> {
         let Self { starts, places, values, diagonal, factor, analyzed, factorized, closed, right, .. } = self;
         let size = diagonal.len();
+        let shift = T::one() + T::of(SHIFT).max(T::of(ROUNDINGS) * T::epsilon());
         memory::grow(right, size, 1, WHAT)?;
         factorized.clear();
         memory::make_room(factorized, values.len(), WHAT)?;
@@ -143,7 +145,7 @@ impl<T: Real> Metric<T> {
             let column = starts[j]..starts[j + 1];
             factorized.extend(places[column.clone()].iter().zip(&values[column]).map(|(&i, &value)| {
                 match (i == j, closed[i], closed[j]) {
-                    (true, Some(own), _) => value + T::of(SHIFT).max(T::epsilon()) * value + own,
+                    (true, Some(own), _) => shift * value + own,
                     // An open row is an equation of its own.
                     (true, None, _) if value > T::zero() => value,
                     (true, None, _) => T::one(),
