@@ -34,9 +34,9 @@ pub(crate) const MANY: usize = 256;
 
 /// Whether the Delassus operator W = G A⁻¹ Gᵀ of a contact problem is formed.
 ///
-/// Without W the problem is solved by projected conjugate gradients (Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23,
-/// 2001) on the displacements: products with A, as many as for a system without contact. Displacements
-/// and velocities of a run then differ by less than 1e-8.
+/// Without W the problem is solved by projected conjugate gradients on the displacements (Gould, Hribar and Nocedal,
+/// SIAM J. Sci. Comput. 23, 2001): products with A, as many as for a system without contact. Displacements and
+/// velocities of a run then differ by less than 1e-8.
 ///
 /// ```
 /// use contact_dynamics::ActiveSet;

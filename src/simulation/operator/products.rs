@@ -31,8 +31,8 @@ pub(super) struct Products<T> {
 const LOOKS: usize = 40;
 const PATIENCE: usize = 3;
 
-/// Products up to which the iteration is chosen: with more, as at large Courant numbers and for modal coordinates, their
-/// number is not well known.
+/// Products up to which the iteration is chosen: with more, as at large Courant numbers and for modal coordinates,
+/// their number is not well known.
 const MANY_PRODUCTS: usize = 64;
 
 /// Products that are tried in any case.
