@@ -2,8 +2,8 @@
 //! twice in ways that must agree. What fails is made as small as it can be and printed.
 //!
 //! `cargo run --release --example random_scenes --features contact-dynamics-random-scenes/whole -- --seconds 600 --seed 1`;
-//! `--scene N` looks at a single one. The program fails if a scene does. Without the feature no run goes on from a
-//! file, or by several threads.
+//! `--scene N` looks at a single one, `--without-w` at scenes with contact solved without W. The program fails if a
+//! scene does. Without the feature no run goes on from a file, or by several threads.
 
 mod tally;
 
@@ -14,7 +14,7 @@ use tally::Tally;
 
 type Anything = Box<dyn std::error::Error>;
 
-const USAGE: &str = "usage: random_scenes [--seconds N] [--seed N] [--scene N] [--quick] [--output DIR]";
+const USAGE: &str = "usage: random_scenes [--seconds N] [--seed N] [--scene N] [--without-w] [--quick] [--output DIR]";
 
 /// Scenes that are made smaller, of each fault.
 const SHRUNK: usize = 2;
@@ -26,13 +26,20 @@ struct Options {
     /// Scenes at most.
     most: u64,
     scene: Option<u64>,
+    without_w: bool,
     output: std::path::PathBuf,
 }
 
 impl Options {
     fn from_command_line() -> Result<Self, Anything> {
-        let mut options =
-            Self { seconds: 20, seed: 1, most: u64::MAX, scene: None, output: "output/random_scenes".into() };
+        let mut options = Self {
+            seconds: 20,
+            seed: 1,
+            most: u64::MAX,
+            scene: None,
+            without_w: false,
+            output: "output/random_scenes".into(),
+        };
         let mut arguments = std::env::args().skip(1);
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or(USAGE);
@@ -40,6 +47,7 @@ impl Options {
                 "--seconds" => options.seconds = value()?.parse()?,
                 "--seed" => options.seed = value()?.parse()?,
                 "--scene" => options.scene = Some(value()?.parse()?),
+                "--without-w" => options.without_w = true,
                 "--quick" => options.most = 1000,
                 "--output" => options.output = value()?.into(),
                 unknown => return Err(format!("unknown option {unknown}; {USAGE}").into()),
@@ -48,6 +56,11 @@ impl Options {
         std::fs::create_dir_all(&options.output)?;
         Ok(options)
     }
+
+    fn recipe(&self, seed: u64) -> Recipe {
+        let recipe = Recipe::of_seed(seed);
+        if self.without_w { recipe.without_w() } else { recipe }
+    }
 }
 
 fn main() -> Result<(), Anything> {
@@ -55,13 +68,13 @@ fn main() -> Result<(), Anything> {
     // (Panics are findings: their words come with the scene.)
     std::panic::set_hook(Box::new(|_| {}));
     if let Some(scene) = options.scene {
-        println!("{}", told(scene));
+        println!("{}", told(scene, &options.recipe(scene)));
         return Ok(());
     }
     let tally = run(&options);
     let mut page = tally.to_string();
     for scene in tally.worst(SHRUNK) {
-        page.push_str(&told(scene));
+        page.push_str(&told(scene, &options.recipe(scene)));
     }
     println!("{page}");
     let path = options.output.join("scenes.md");
@@ -84,7 +97,7 @@ fn run(options: &Options) -> Tally {
             if seed - options.seed >= options.most {
                 break;
             }
-            let recipe = Recipe::of_seed(seed);
+            let recipe = options.recipe(seed);
             tally.add(seed, &recipe, recipe.examine());
         }
         tally
@@ -100,14 +113,13 @@ fn run(options: &Options) -> Tally {
 }
 
 /// A scene, and the smallest one that fails as it does.
-fn told(seed: u64) -> String {
-    let recipe = Recipe::of_seed(seed);
+fn told(seed: u64, recipe: &Recipe) -> String {
     let verdict = recipe.examine();
     let summary = recipe.summary();
     let Some(finding) = verdict.finding else {
         return format!("scene {seed}: {summary}\n{verdict:?}\n");
     };
-    let least = shrunk(&recipe, |recipe| recipe.examine().finding.is_some_and(|other| other.what == finding.what));
+    let least = shrunk(recipe, |recipe| recipe.examine().finding.is_some_and(|other| other.what == finding.what));
     if least.dofs() == recipe.dofs() && least.dofs() > 200 {
         return format!("\nscene {seed}: {finding}\n{summary}\n");
     }

@@ -18,6 +18,22 @@ fn scenes_by_chance_hold_what_must_hold() {
     assert!(built > 1500 && closed > 10_000 && compared > 40_000, "{built} {closed} {compared}");
 }
 
+/// The same by conjugate gradients in place of W. Hardening springs show whether a resumed run, which does not know the
+/// contact forces of the stage before, takes as many iterations as the run itself.
+#[test]
+fn scenes_without_w_hold_what_must_hold() {
+    let mut closed = 0;
+    for seed in 10_000..11_500 {
+        let recipe = Recipe::of_seed(seed).without_w();
+        let verdict = recipe.examine();
+        if let Some(finding) = verdict.finding {
+            panic!("`--example random_scenes -- --without-w --scene {seed}`: {finding}\n{}", recipe.summary());
+        }
+        closed += verdict.closed;
+    }
+    assert!(closed > 5_000, "{closed}");
+}
+
 /// Scenes with rows that pulled, or beside friction missed their gap or rubbed beyond their cone, whose results
 /// depended on units, on the order of rows, or on a common velocity, whose energy grew, and such as could not go on from
 /// a state that the host does not admit though the run itself did.

@@ -153,7 +153,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         match solved {
             Some(Outcome { products, is_solved: true, .. }) => Ok(Some(products)),
             Some(Outcome { products, residual, .. }) if assembly == Assembly::Never => Err(Error::LinearNotConverged {
-                method: "projected conjugate gradients for contact",
+                method: "projected conjugate gradients for contact (`Assembly::Automatic` forms W where they fail)",
                 iterations: products,
                 residual,
                 tolerance: projected_residual::<T>().value(),
