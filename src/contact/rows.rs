@@ -237,31 +237,27 @@ impl<T: Real> ContactJacobian<T> {
 /// Products of vectors with the rows of a list. Rows that share no dof with a vector are not visited.
 #[derive(Debug, Default)]
 pub(crate) struct RowProducts<T> {
-    /// For each dof the first of the entries that act on it; each names the next one.
-    first: Vec<usize>,
-    acting: Vec<Acting<T>>,
+    /// The dofs that rows act on, in the order in which they were met, and the number of each dof among them.
+    dofs: Vec<usize>,
+    numbers: Vec<usize>,
+    /// By number: the rows that act on a dof, ascending, with their weights.
+    starts: Vec<usize>,
+    acting: Vec<(usize, T)>,
     /// Products of the present vector by row, and the rows that it has visited.
     sums: Vec<T>,
     visited: Vec<usize>,
     is_visited: Vec<bool>,
 }
 
-/// A weight of a row on a dof.
-#[derive(Clone, Copy, Debug)]
-struct Acting<T> {
-    dof: usize,
-    row: usize,
-    weight: T,
-    next: usize,
-}
-
-/// After the last entry of a dof.
-const LAST: usize = usize::MAX;
+/// The number of a dof that no row acts on.
+const NO_ROW: usize = usize::MAX;
 
 impl<T: Real> RowProducts<T> {
     /// Memory for rows on this number of dofs.
     pub(crate) fn reserve(&mut self, rows: usize, dofs: usize) {
-        self.first.resize(dofs.max(self.first.len()), LAST);
+        self.numbers.resize(dofs.max(self.numbers.len()), NO_ROW);
+        self.dofs.reserve(4 * rows);
+        self.starts.reserve(4 * rows + 2);
         self.acting.reserve(4 * rows);
         self.sums.reserve(rows);
         self.visited.reserve(rows);
@@ -276,42 +272,61 @@ impl<T: Real> RowProducts<T> {
         row: impl Fn(usize) -> R,
     ) -> Result<()> {
         const WHAT: &str = "the products of contact rows";
-        let Self { first, acting, sums, visited, is_visited } = self;
-        acting.drain(..).for_each(|entry| first[entry.dof] = LAST);
-        if first.len() < dofs {
-            make_room(first, dofs - first.len(), WHAT)?;
-            first.resize(dofs, LAST);
+        let Self { dofs: met, numbers, starts, acting, sums, visited, is_visited } = self;
+        met.drain(..).for_each(|dof| numbers[dof] = NO_ROW);
+        if numbers.len() < dofs {
+            make_room(numbers, dofs - numbers.len(), WHAT)?;
+            numbers.resize(dofs, NO_ROW);
         }
-        make_room(acting, (0..rows).map(|k| row(k).count()).sum(), WHAT)?;
-        // The last row first: those of a dof then ascend.
-        for k in (0..rows).rev() {
-            for (dof, weight) in row(k) {
-                let next = std::mem::replace(&mut first[dof], acting.len());
-                acting.push(Acting { dof, row: k, weight, next });
-            }
-        }
+        let entries: usize = (0..rows).map(|k| row(k).count()).sum();
+        make_room(met, entries.min(dofs), WHAT)?;
+        starts.clear();
+        make_room(starts, entries.min(dofs) + 2, WHAT)?;
+        acting.clear();
         sums.clear();
-        visited.clear();
-        is_visited.clear();
         grow(sums, rows, 1, WHAT)?;
+        visited.clear();
         make_room(visited, rows, WHAT)?;
+        is_visited.clear();
         make_room(is_visited, rows, WHAT)?;
         is_visited.resize(rows, false);
+        make_room(acting, entries, WHAT)?;
+        acting.resize(entries, (0, T::zero()));
+        // Counts, two places behind; then starts, one place behind; each moves to its place as entries are written.
+        starts.extend([0, 0]);
+        for (dof, _) in (0..rows).flat_map(&row) {
+            if numbers[dof] == NO_ROW {
+                numbers[dof] = met.len();
+                met.push(dof);
+                starts.push(0);
+            }
+            starts[numbers[dof] + 2] += 1;
+        }
+        (2..starts.len()).for_each(|number| starts[number] += starts[number - 1]);
+        for k in 0..rows {
+            for (dof, weight) in row(k) {
+                let at = &mut starts[numbers[dof] + 1];
+                acting[*at] = (k, weight);
+                *at += 1;
+            }
+        }
         Ok(())
     }
 
     /// Calls `put` with each row that shares a dof with a vector, in ascending order, and their product.
     pub(crate) fn each(&mut self, vector: impl Iterator<Item = (usize, T)>, mut put: impl FnMut(usize, T)) {
-        let Self { first, acting, sums, visited, is_visited } = self;
+        let Self { numbers, starts, acting, sums, visited, is_visited, .. } = self;
         for (dof, own) in vector {
-            let mut at = first[dof];
-            while let Some(&Acting { row, weight, next, .. }) = acting.get(at) {
+            let number = numbers[dof];
+            if number == NO_ROW {
+                continue;
+            }
+            for &(row, weight) in &acting[starts[number]..starts[number + 1]] {
                 if !is_visited[row] {
                     is_visited[row] = true;
                     visited.push(row);
                 }
                 sums[row] += own * weight;
-                at = next;
             }
         }
         visited.sort_unstable();
