@@ -355,11 +355,12 @@ impl<T: Real> Operator<T> {
             return Ok(None);
         }
         self.read_products(system, h, at)?;
+        let responses = self.work_of_responses(rows.len());
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
         if assembly == Assembly::Automatic {
             let entries = rows.iter().map(|&row| g.located(row).count()).sum();
-            let with_w = self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
+            let with_w = responses + self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
             match products.affordable(entries, with_w) {
                 Some(count) => affordable = count,
                 None => return Ok(None),
@@ -377,6 +378,15 @@ impl<T: Real> Operator<T> {
             }
         }
         Ok(Some(outcome))
+    }
+
+    /// Multiplications for the responses to some rows, if the matrix changes too often to keep them.
+    fn work_of_responses(&self, rows: usize) -> f64 {
+        let of_one = match self.contact {
+            ContactPath::Full => 2.0 * self.factor.stored_values() as f64,
+            ContactPath::Condensed | ContactPath::Apart => (self.interface.len() as f64).powi(2),
+        };
+        if self.varies() { rows as f64 * of_one } else { 0.0 }
     }
 
     /// Reads what products need of the present matrix.

@@ -190,6 +190,24 @@ fn jumps_of_hundreds_of_rows() {
     }
 }
 
+/// Newton's method factorizes in every iteration, and W takes a solve for each of 289 rows after each: products with the
+/// tangent are chosen.
+#[test]
+fn responses_that_cannot_be_kept_count_as_work() {
+    let solid = Solid::block([1.6, 1.6, 0.3], [16, 16, 3], MATERIAL);
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
+    let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+    let body = Hyperelastic::new(&solid, Law::NeoHookean).gravity([0.0, 0.0, -0.05]);
+    let mut run = Simulation::builder(body, GeneralizedAlpha::default(), 0.1 / MATERIAL.wave_speed())
+        .constraint(NodesOnObstacle::new(floor, &solid.nodes, &solid.node_dofs(), &bottom).unwrap())
+        .build()
+        .unwrap();
+    run.step().unwrap();
+    assert!(run.state().contacts().closed().iter().all(|&closed| closed));
+    let statistics = run.statistics();
+    assert!(statistics.contact_products > 0 && statistics.contact_iterations == 0, "{statistics:?}");
+}
+
 /// Two equations that contradict each other have no solution, and the error names what is left of them.
 #[test]
 fn what_cannot_be_closed_is_refused() {
