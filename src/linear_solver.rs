@@ -18,6 +18,7 @@ mod tridiagonal;
 pub use by_body::ByBody;
 pub(crate) use by_body::components;
 pub use cholesky::Cholesky;
+pub(crate) use cholesky::negligible;
 pub use conjugate_gradients::ConjugateGradients;
 pub use diagonal::Diagonal;
 pub use lu::Lu;

@@ -199,7 +199,7 @@ struct Supernodes<T> {
 }
 
 /// In a matrix with `n` dofs a pivot below this share of its diagonal entry is zero up to rounding.
-pub(super) fn negligible<T: Real>(n: usize) -> T {
+pub(crate) fn negligible<T: Real>(n: usize) -> T {
     rounding(T::of((n as f64).sqrt()))
 }
 

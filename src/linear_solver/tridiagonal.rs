@@ -1,6 +1,6 @@
 //! L D Lᵀ of matrices whose dofs form chains, here called strings.
 
-use super::cholesky::negligible;
+use super::negligible;
 use super::selection::Selection;
 use super::{Condensation, Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};

@@ -5,7 +5,7 @@ use super::rows::Rows;
 use super::statuses::{Role, Statuses};
 use crate::contact::RowProducts;
 use crate::error::{Error, Result};
-use crate::linear_solver::{Automatic, Factorization, LinearSolver};
+use crate::linear_solver::{Automatic, Factorization, LinearSolver, negligible};
 use crate::memory;
 use crate::real::Real;
 use crate::rounding::rounding;
@@ -51,10 +51,10 @@ impl<T: Real> Miss<T> {
     }
 }
 
-/// Added to the diagonal of N, as a share of it, and at least `ROUNDINGS`: rows may depend on one another. Repeated
-/// projections remove its effect. Rows of two surfaces that lie on each other may have eigenvalues down to 1e-8.
+/// Added to the diagonal of N, as a share of it, because rows may depend on one another: at least twice the pivot that
+/// a factorization refuses. Repeated projections remove its effect. Rows of two surfaces that lie on each other may have
+/// eigenvalues down to 1e-8.
 const SHIFT: f64 = 1e-10;
-const ROUNDINGS: f64 = 16.0;
 
 /// The change of a compliance, as a share of the diagonal, from which on N is factorized again.
 const ANOTHER: f64 = 1e-3;
@@ -137,7 +137,7 @@ impl<T: Real> Metric<T> {
     fn factorize(&mut self) -> Result<()> {
         let Self { starts, places, values, diagonal, factor, analyzed, factorized, closed, right, .. } = self;
         let size = diagonal.len();
-        let shift = T::one() + T::of(SHIFT).max(T::of(ROUNDINGS) * T::epsilon());
+        let shift = T::one() + T::of(SHIFT).max(T::of(2.0) * negligible(size));
         memory::grow(right, size, 1, WHAT)?;
         factorized.clear();
         memory::make_room(factorized, values.len(), WHAT)?;
