@@ -199,19 +199,12 @@ impl<T: Real> JumpProblem<T> {
             projection.sort(g, &self.rows);
         }
         let mut group = std::mem::take(&mut self.group);
-        let mut result = Ok(());
-        for number in 0..projection.groups().len() {
-            result = match is_large.then(|| self.solve_without_s((g, projection), (number, least), presses)) {
-                Some(Ok(true)) => Ok(()),
-                Some(Err(error)) => Err(error),
-                Some(Ok(false)) | None => {
-                    self.solve_with_s((g, projection), (number, &mut group), solver, presses, (t, &id))
-                }
-            };
-            if result.is_err() {
-                break;
+        let result = (0..projection.groups().len()).try_for_each(|number| {
+            if is_large && self.solve_without_s((g, projection), (number, least), presses)? {
+                return Ok(());
             }
-        }
+            self.solve_with_s((g, projection), (number, &mut group), solver, presses, (t, &id))
+        });
         self.group = group;
         self.increments.clear();
         self.increments.extend(self.totals.iter().zip(&self.base).map(|(&total, &base)| total - base));

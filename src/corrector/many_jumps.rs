@@ -95,7 +95,6 @@ impl<T: Real> ManyJumps<T> {
             memory::grow(values, size, 1, WHAT)?;
         }
         for values in [&mut *moved, sizes] {
-            values.clear();
             memory::grow(values, inverse.len(), 1, WHAT)?;
         }
         rows.clear();

@@ -3,8 +3,8 @@
 use contact_dynamics::contact::ContactJacobian;
 use contact_dynamics::{JumpProjection, Mass};
 
-/// Two nodes hit a plate whose motion is prescribed. Its dof is in both rows, but couples them not: each is a group of
-/// its own, and the plate stops both.
+/// Two nodes hit a plate whose motion is prescribed. Its dof is in both rows, but does not couple them: each is a
+/// group of its own, and the plate stops both.
 #[test]
 fn contacts_with_a_prescribed_dof_in_common() {
     for plate in 0..3_usize {

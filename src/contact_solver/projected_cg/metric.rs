@@ -190,11 +190,7 @@ impl<T: Real> Metric<T> {
                 values.push(product);
             });
             let own = places[first..].binary_search(&j);
-            if let Err(at) = own {
-                places.insert(first + at, j);
-                values.insert(first + at, T::zero());
-            }
-            diagonal.push(values[first + own.unwrap_or_else(|at| at)]);
+            diagonal.push(own.map_or(T::zero(), |at| values[first + at]));
             starts.push(places.len());
         }
         Ok(())

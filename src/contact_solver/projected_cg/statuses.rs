@@ -78,7 +78,7 @@ impl<T: Real> Statuses<T> {
     }
 
     /// Decides anew from the present multipliers and x, of which the last entries are the displacements of compliant
-    /// rows. Returns whether the equations differ from those that were solved.
+    /// rows. Returns whether the equations have changed.
     pub(super) fn update(&mut self, rows: &mut Rows<T>, x: &mut [T], metric: &mut Metric<T>) -> bool {
         let share = projected_residual::<T>();
         let scaled = |lambda: T, row: usize, metric: &Metric<T>| lambda * metric.diagonal(row).sqrt();
@@ -147,7 +147,7 @@ impl<T: Real> Statuses<T> {
     }
 
     /// Decides whether a closed contact sticks or slides, with the radius μ p of its disc of friction. `small` is a
-    /// force over √N_ii that counts as rounding. Returns whether the equations differ from those that were solved.
+    /// force over √N_ii that counts as rounding. Returns whether the equations have changed.
     fn slide(
         &mut self,
         at: usize,

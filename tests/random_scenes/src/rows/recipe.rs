@@ -158,7 +158,7 @@ pub enum Contacting {
 }
 
 impl Contacting {
-    /// Whether the solution is as accurate as an iteration is ended.
+    /// Whether forces are found by an iteration that ends at a tolerance.
     pub fn iterates(self) -> bool {
         matches!(self, Self::GaussSeidel | Self::ProjectedGradient | Self::WithoutW)
     }
