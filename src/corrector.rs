@@ -155,16 +155,22 @@ pub struct Effects {
     pub corrects_massless: bool,
     /// [`predict`](Corrector::predict) does something; its memory is reserved only then.
     pub predicts: bool,
+    /// [`correct`](Corrector::correct) changes the motion only by [`push_velocity`](Correction::push_velocity),
+    /// [`push_acceleration`](Correction::push_acceleration) and [`project_past`](Correction::project_past), so that
+    /// the [gradient](crate::gradient) of a run passes through it. Runs with other correctors are not recorded.
+    pub is_differentiable: bool,
 }
 
 impl Effects {
     /// The effects of several correctors together.
     pub(crate) fn of_all<T: Real>(correctors: &[Box<dyn Corrector<T> + '_>]) -> Self {
-        correctors.iter().map(Corrector::effects).fold(Self::default(), |all, own| Self {
+        let none = Self { is_differentiable: true, ..Self::default() };
+        correctors.iter().map(Corrector::effects).fold(none, |all, own| Self {
             edits: all.edits.max(own.edits),
             leaves_smooth_motion: all.leaves_smooth_motion || own.leaves_smooth_motion,
             corrects_massless: all.corrects_massless || own.corrects_massless,
             predicts: all.predicts || own.predicts,
+            is_differentiable: all.is_differentiable && own.is_differentiable,
         })
     }
 }

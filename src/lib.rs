@@ -15,6 +15,7 @@ pub mod contact_solver;
 pub mod corrector;
 mod dense;
 mod error;
+pub mod gradient;
 #[cfg(all(shared_instances, not(test)))]
 mod instances;
 pub mod integrator;

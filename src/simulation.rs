@@ -14,7 +14,10 @@ mod step;
 mod watch;
 
 pub use build::builder::SimulationBuilder;
+pub(crate) use build::program::{CompiledStage, Program};
 pub(crate) use operator::Operator;
+pub(crate) use operator::tangent::At;
+pub(crate) use run::Parts;
 pub use run::Simulation;
 pub use run::contact_output::ContactForce;
 pub use run::results::{Energy, Outcome, Statistics, Works};
@@ -23,4 +26,5 @@ pub use stage::newton::{Iteration, Newton};
 pub use start::InitialOverclosure;
 pub use start::balance::StartAdjustment;
 pub use start::problem::StartImpact;
+pub(crate) use start::projection;
 pub use step::judge::StepControl;

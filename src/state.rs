@@ -13,6 +13,7 @@ mod parts;
 mod read;
 #[cfg(feature = "serde")]
 mod record;
+mod tape;
 
 pub(crate) use backup::Backup;
 #[cfg(feature = "serde")]
@@ -23,6 +24,7 @@ pub use contacts::{ContactState, ContactStatus};
 pub(crate) use history::ComputedMotions;
 pub use history::History;
 pub(crate) use overclosures::Overclosures;
+pub(crate) use tape::{Change, Changes, Held, StageRecord, StartingPast, StepRecord, Tape};
 
 use crate::contact::BrokenBond;
 use crate::real::Real;
@@ -60,9 +62,10 @@ impl<T: Real> Motion<T> {
         self.a.copy_from_slice(&other.a);
     }
 
-    /// Mutable field 1 or 2: v or a.
-    pub(crate) fn rate_mut(&mut self, field: usize) -> &mut Vec<T> {
+    /// Mutable field 0, 1, 2: u, v, a.
+    pub(crate) fn field_mut(&mut self, field: usize) -> &mut Vec<T> {
         match field {
+            0 => &mut self.u,
             1 => &mut self.v,
             _ => &mut self.a,
         }

@@ -6,7 +6,7 @@ use super::switching::Switching;
 use crate::contact::GapRates;
 use crate::contact_solver::FORESEEN;
 use crate::real::Real;
-use crate::state::ContactState;
+use crate::state::{Changes, ContactState};
 
 /// Memory of the corrections of a stage.
 #[derive(Debug)]
@@ -29,6 +29,8 @@ pub(crate) struct Buffers<T> {
     pub(crate) switching: Box<Switching<T>>,
     /// Contacts that receive energy together.
     pub(super) given: Given<T>,
+    /// The changes made, if the run is recorded.
+    pub(crate) changes: Option<Box<Changes<T>>>,
 }
 
 /// Rows that corrections act on, and their forces before.
@@ -53,6 +55,8 @@ pub(super) struct Removal<T> {
     /// The rows of the contacts, tangential rows included, and their multipliers.
     pub(super) rows: Vec<usize>,
     pub(super) multipliers: Vec<T>,
+    /// Whether the jump of a row is removed: all but those of touching rows that separate.
+    pub(super) held: Vec<bool>,
     /// The multipliers without those of tangential rows, one per contact.
     pub(super) normal: Vec<T>,
 }
@@ -135,6 +139,7 @@ impl<T: Real> Buffers<T> {
             shifted: vec![T::zero(); predicted],
             switching: Box::new(Switching::new(rows, switching)),
             given: Given::default(),
+            changes: None,
         };
         buffers.make_room(rows);
         buffers
@@ -150,8 +155,9 @@ impl<T: Real> Buffers<T> {
         problem.make_room(rows);
         reserve(&mut [closed, engaged, opened, released, &mut given.rows, &mut given.group], rows);
         reserve(&mut [reported, impacts, &mut given.energies, &mut given.impulses, &mut given.shares], rows);
-        for Removal { rows: own, multipliers, normal } in [impulses, forces] {
+        for Removal { rows: own, multipliers, held, normal } in [impulses, forces] {
             reserve(&mut [own], rows);
+            reserve(&mut [held], rows);
             reserve(&mut [multipliers, normal], rows);
         }
         if !damping.change.is_empty() {

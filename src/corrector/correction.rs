@@ -6,6 +6,7 @@ mod energy;
 mod jumps;
 mod parts;
 mod past;
+mod record;
 mod restitution;
 
 use super::{Buffers, Corrector, JumpProjection};

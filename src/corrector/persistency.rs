@@ -137,7 +137,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
             HistoryProjection::Off => Edits::NewState,
             HistoryProjection::On => Edits::Past,
         };
-        Effects { edits, ..Effects::default() }
+        Effects { edits, is_differentiable: true, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

@@ -70,6 +70,10 @@ impl<T: Real> Factorization<T> for Inverse<T> {
         Ok(())
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn stored_values(&self) -> usize {
         self.reciprocals.len()
     }

@@ -435,6 +435,16 @@ impl<T: Real> Operator<T> {
         self.delassus.version = 0;
     }
 
+    /// Whether A is taken as symmetric.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        self.factor.is_symmetric()
+    }
+
+    /// Number of dofs on the interface.
+    pub(crate) fn interface(&self) -> usize {
+        self.interface.len()
+    }
+
     pub(crate) fn stored_values(&self) -> usize {
         self.factor.stored_values()
     }

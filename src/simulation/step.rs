@@ -1,6 +1,6 @@
 //! One step of the present size: stages, corrections, acceptance; a failed step leaves everything unchanged.
 //!
-//! - `stages`: the stages of the step: predicted, solved, completed and corrected.
+//! - `stages`: the stages of the step: predicted, solved, completed and corrected; `record`: a stage on a tape.
 //! - `accept`: checks a solved step and makes it the state; `finite`: its check for NaN and infinity; `jumps`: contacts
 //!   that close or open in it, and friction that changes.
 //! - `judge`: whether a step is fine enough; `control`: repeats refused steps.
@@ -11,6 +11,7 @@ pub(super) mod control;
 pub(super) mod finite;
 pub(super) mod judge;
 pub(super) mod jumps;
+mod record;
 pub(super) mod resample;
 mod restart;
 mod stages;
@@ -74,6 +75,9 @@ impl<T: Real> Simulation<'_, T> {
         if !constraints.tangents().is_empty() {
             forces_at_start.clone_from(&trial.lambda);
             sliding_at_start.clone_from(&trial.sliding);
+        }
+        if let Some(tape) = &mut work.tape {
+            tape.stages.clear();
         }
         work.backup.begin();
         work.contact.impulses.begin();

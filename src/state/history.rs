@@ -133,7 +133,7 @@ impl<T: Real> History<T> {
             self.computed.push(&self.slots[1], self.made_with);
             for (field, unshifted) in (1..).zip(&mut self.unshifted) {
                 if let Some(front) = self.computed.front().filter(|_| !unshifted.is_empty()) {
-                    std::mem::swap(front.rate_mut(field), unshifted);
+                    std::mem::swap(front.field_mut(field), unshifted);
                     unshifted.clear();
                 }
             }

@@ -101,6 +101,10 @@ impl<T: Real> Correction<'_, T> {
                 for ((force, &limited), &part) in forces.iter_mut().zip(limited).zip(part) {
                     *force -= (T::one() - part * part) * limited;
                 }
+                self.refuse_gradient(
+                    "damping in corrected contacts",
+                    "a step does not resolve it: choose smaller steps",
+                );
                 return Ok(());
             }
         }

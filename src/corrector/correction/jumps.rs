@@ -170,6 +170,7 @@ impl<T: Real> Correction<'_, T> {
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn push_velocity(&mut self) -> Result<()> {
         let impulses = std::mem::take(&mut self.buffers.impulses);
+        self.record_removal(1, &impulses);
         let mut result = self.apply(&impulses.rows, &impulses.multipliers);
         for (&row, &impulse) in impulses.rows.iter().zip(&impulses.multipliers) {
             if impulse != T::zero() {
@@ -197,9 +198,10 @@ impl<T: Real> Correction<'_, T> {
     /// The errors of a solve with a consistent mass, [`Error::LinearNotConverged`] and [`Error::Singular`].
     pub fn push_acceleration(&mut self) -> Result<()> {
         let mut forces = std::mem::take(&mut self.buffers.forces);
-        let Removal { rows, multipliers, .. } = &mut forces;
         let given = T::of(self.scheme.acceleration / self.scheme.balance);
-        let result = self.limit_forces(rows, multipliers, given).and_then(|()| self.push_forces(rows, multipliers));
+        let result = self.limit_forces(&forces.rows, &mut forces.multipliers, given);
+        self.record_removal(2, &forces);
+        let result = result.and_then(|()| self.push_forces(&forces.rows, &forces.multipliers));
         self.buffers.forces = forces;
         result
     }
@@ -208,9 +210,12 @@ impl<T: Real> Correction<'_, T> {
 impl<T: Real> Removal<T> {
     /// Stores the increments of a solved problem.
     fn store(&mut self, problem: &JumpProblem<T>) {
-        let JumpProblem { blocks, rows, increments, .. } = problem;
+        let JumpProblem { blocks, rows, owners, totals, increments, .. } = problem;
         self.rows.clone_from(rows);
         self.multipliers.clone_from(increments);
+        self.held.clear();
+        let held = |(&owner, &total): (&usize, &T)| blocks[owner].set.is_bilateral() || total != T::zero();
+        self.held.extend(owners.iter().zip(totals).map(held));
         self.normal.clear();
         self.normal.extend(blocks.iter().map(|block| increments[block.place]));
     }

@@ -121,6 +121,7 @@ impl<T: Real> Correction<'_, T> {
         for (&row, &multiplier) in problem.rows.iter().zip(&problem.increments) {
             contacts.impulse[row] += T::of(unit) * multiplier;
         }
+        self.record_past(k, field, T::of(unit));
         Ok(())
     }
 

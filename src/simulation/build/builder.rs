@@ -489,7 +489,7 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             constraints,
             g,
             scheme,
-            compiled: Compiled { program, startup },
+            compiled: Compiled { program, startup, h },
             state,
             history,
             work,

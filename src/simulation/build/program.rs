@@ -86,6 +86,17 @@ impl<T: Real> ScaledRow<T> {
         T::combine(plain, differences, &newest.u[block.clone()], out);
     }
 
+    /// Adds to the derivatives by past states what the derivatives by this row give: the transpose of
+    /// [`predict_block`](Self::predict_block), for all dofs.
+    pub(crate) fn transpose(&self, row: &[T], past: &mut [Motion<T>]) {
+        for term in &self.terms {
+            T::axpy(term.c, row, past[term.state].field_mut(term.field));
+            if term.is_difference() {
+                T::axpy(-term.c, row, &mut past[0].u);
+            }
+        }
+    }
+
     /// The part that comes from the past at a dof, if there is any.
     pub(crate) fn past_at(&self, past: &[Motion<T>], dof: usize) -> Option<T> {
         let newest = past.first().filter(|_| !self.terms.is_empty())?;
@@ -130,6 +141,13 @@ impl<T: Real> ScaledRows<T> {
     /// Whether u, v or a depends on the past.
     pub(crate) fn reads_past(&self, field: usize) -> bool {
         !self.0[field].terms.is_empty()
+    }
+
+    /// Adds to the derivatives by past states what the derivatives by u, v and a give.
+    pub(crate) fn transpose(&self, rows: [&[T]; 3], past: &mut [Motion<T>]) {
+        for (scaled, row) in self.0.iter().zip(rows) {
+            scaled.transpose(row, past);
+        }
     }
 
     /// Whether u, v or a contains differences of displacements.
@@ -303,17 +321,20 @@ pub(crate) struct Compiled<T: Real> {
     pub(crate) program: Program<T>,
     /// The one-step scheme of the first steps; none once the past is known.
     pub(crate) startup: Option<Program<T>>,
+    /// The step size for which both are compiled.
+    pub(crate) h: f64,
 }
 
 impl<T: Real> Compiled<T> {
-    /// Recompiles for the step size h instead of `old`. After an error the programs are as before.
+    /// Recompiles for the step size h. After an error the programs are as before.
     pub(crate) fn set_step_size(
         &mut self,
         scheme: &Scheme<'_>,
         system: &mut dyn System<T>,
-        [old, h]: [f64; 2],
+        h: f64,
         at: At<'_, T>,
     ) -> Result<()> {
+        let old = self.h;
         let (stages, starter) = (&scheme.tableau.stages, &scheme.derived.starter.stages);
         self.program.set_step_size(stages, system, old, h, at)?;
         if let Some(startup) = &mut self.startup
@@ -322,6 +343,7 @@ impl<T: Real> Compiled<T> {
             self.program.set_step_size(stages, system, h, old, at)?;
             return Err(error);
         }
+        self.h = h;
         Ok(())
     }
 }

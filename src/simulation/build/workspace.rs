@@ -19,7 +19,7 @@ use crate::simulation::stage::supports::Supports;
 use crate::simulation::stage::vectors::StageVectors;
 use crate::simulation::start::rate_check::RateCheck;
 use crate::simulation::watch::stiffening::Stiffening;
-use crate::state::{ContactState, Motion};
+use crate::state::{ContactState, Motion, Tape};
 use crate::system::{Linearity, System};
 
 /// Memory of a step.
@@ -43,6 +43,8 @@ pub(crate) struct Workspace<T: Real> {
     /// v and a at the time of the new state, if the scheme stores them at another time.
     pub(crate) rates: [Vec<T>; 2],
     pub(crate) backup: Backup<T>,
+    /// If the run is recorded.
+    pub(crate) tape: Option<Box<Tape<T>>>,
 }
 
 /// Memory of the corrections.
@@ -130,6 +132,7 @@ impl<T: Real> Workspace<T> {
             rows,
             rates: [Vec::new(), Vec::new()],
             backup: Backup::new(if effects.edits == Edits::Past { slots - 1 } else { 0 }, dofs),
+            tape: None,
         }
     }
 

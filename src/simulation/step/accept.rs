@@ -136,6 +136,9 @@ impl<T: Real> Simulation<'_, T> {
         history.extend(&state.motion.u, &work.massless, scheme.depth, changes.jumps || changes.friction_jumps);
         statistics.contact_changes += changes.count as u64;
         statistics.steps += 1;
+        if let Some(tape) = &mut work.tape {
+            tape.end_step(history.made_with, self.compiled.startup.is_some(), state.clone(), !changes.jumps);
+        }
         if history.known == scheme.depth {
             self.compiled.startup = None;
         }

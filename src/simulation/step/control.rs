@@ -52,14 +52,14 @@ impl<T: Real> Simulation<'_, T> {
             }
             (Err(error), None) => Err(error),
             (Err(error), Some((state, history))) => {
-                let (h, tried) = (history.clock.h, self.history.clock.h);
+                let h = history.clock.h;
                 (self.state, self.history) = (state, history);
                 if self.history.known == self.scheme.depth {
                     self.compiled.startup = None;
                 }
                 let Self { parts, compiled, scheme, state, .. } = self;
                 let at = At::state(&state.motion);
-                let compiled = compiled.set_step_size(scheme, &mut *parts.system, [tried, h], at);
+                let compiled = compiled.set_step_size(scheme, &mut *parts.system, h, at);
                 self.parts.together.finish(compiled)?;
                 Err(error)
             }

@@ -116,8 +116,8 @@ impl<T: Real> Simulation<'_, T> {
             }
             false => (self.resampled(h)?, None, None),
         };
-        let Self { parts, compiled, scheme, state, history, statistics, .. } = self;
-        compiled.set_step_size(scheme, &mut *parts.system, [old, h], At::state(&state.motion))?;
+        let Self { parts, compiled, scheme, state, history, statistics, work, .. } = self;
+        compiled.set_step_size(scheme, &mut *parts.system, h, At::state(&state.motion))?;
         if starter.is_some() {
             compiled.startup = starter;
         }
@@ -134,6 +134,14 @@ impl<T: Real> Simulation<'_, T> {
             history.known = 1;
         }
         history.clock = clock;
+        let is_kept = scheme.depth == 1 && scheme.shifts == [0.0; 2];
+        if let Some(tape) = work.tape.as_mut().filter(|_| !is_kept) {
+            tape.refuse(
+                "a change of the step size",
+                "it moves stored values of this scheme: choose one that stores u, v and a at the time of the state, \
+                 and reads no older states, such as the trapezoidal rule",
+            );
+        }
         Ok(())
     }
 
@@ -189,8 +197,17 @@ impl<T: Real> Simulation<'_, T> {
         Ok(Some((projection, closed)))
     }
 
+    /// Compiles the scheme for a step size, and leaves the motion as it is: for the gradient.
+    pub(crate) fn compile_for(&mut self, h: f64) -> Result<()> {
+        let Self { parts: Parts { system, .. }, compiled, scheme, state, .. } = self;
+        match h.to_bits() == compiled.h.to_bits() {
+            true => Ok(()),
+            false => compiled.set_step_size(scheme, &mut **system, h, At::state(&state.motion)),
+        }
+    }
+
     /// The scheme of the first steps, for a step size and tangents at a motion.
-    pub(super) fn compiled_starter(&mut self, h: f64, motion: &Motion<T>) -> Result<Program<T>> {
+    pub(crate) fn compiled_starter(&mut self, h: f64, motion: &Motion<T>) -> Result<Program<T>> {
         let Self { parts: Parts { system, linear_solver, .. }, constraints, scheme, .. } = self;
         let (interface, unit) = (constraints.interface(), Unit::of(constraints));
         let at = At::state(motion);
@@ -283,7 +300,7 @@ fn move_shifted<T: Real>(scheme: &Scheme<'_>, state: &mut State<T>, history: &mu
         if shift == 0.0 {
             continue;
         }
-        let stored = state.motion.rate_mut(field);
+        let stored = state.motion.field_mut(field);
         if unshifted.is_empty() {
             unshifted.clone_from(stored);
         }

@@ -81,6 +81,9 @@ impl<T: Real> Simulation<'_, T> {
         begun.broken = std::mem::take(&mut self.state.broken);
         (past.pace, past.clock) = (self.history.pace, self.history.clock);
         (self.state, self.history) = (begun, past);
+        if let Some(tape) = &mut self.work.tape {
+            tape.refuse("a restart", "its accelerations follow from the balance, which the tape does not have");
+        }
         Ok(())
     }
 }

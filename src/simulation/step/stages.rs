@@ -45,7 +45,7 @@ impl<T: Real> Simulation<'_, T> {
                 vectors: &mut work.vectors,
                 contact: &mut work.contact,
             };
-            let Workspace { correction, excess, massless, newton, block, backup, .. } = work;
+            let Workspace { correction, excess, massless, newton, block, backup, tape, .. } = work;
 
             solve.predict()?;
             predict_corrections(&mut solve, correction, correctors, massless, place == 0)?;
@@ -61,13 +61,17 @@ impl<T: Real> Simulation<'_, T> {
                 correction.energy += excess.solve_again(&mut solve, switching, projection)?;
             }
 
+            let covector = start_covector.unwrap_or(&stage.covector);
+            let impulse_weight = impulse_weight(stage.response, covector);
+            if let Some(tape) = tape {
+                let d = newton.as_ref().map_or(&solve.vectors.increment, |newton| &newton.d);
+                solve.record(tape, d, T::of(clock.h * impulse_weight));
+            }
             solve.set_support_accelerations();
             solve.set_massless_rates(place, history.made_with, &history.slopes);
             if solve.constraints.len() == 0 {
                 continue;
             }
-            let covector = start_covector.unwrap_or(&stage.covector);
-            let impulse_weight = impulse_weight(stage.response, covector);
             let booking = Booking { impulse_weight, is_first: place == 0, is_last: place + 1 == stages };
             solve.close(&booking, &mut correction.buffers)?;
             if let Some(excess) = excess {
@@ -76,6 +80,9 @@ impl<T: Real> Simulation<'_, T> {
 
             let scheme = numbers(stage, clock.h, covector, [place, stages]);
             correct(solve, scheme, correctors, Corrected { correction, block: block.as_mut(), massless, backup })?;
+            if let (Some(tape), Some(changes)) = (tape, &mut correction.buffers.changes) {
+                tape.correct(changes);
+            }
         }
         Ok(())
     }

@@ -1,0 +1,189 @@
+//! A run back: the derivatives by the states, from the last step to the first.
+
+use super::changes::ChangesBack;
+use super::products::Tangents;
+use super::stage::StageBack;
+use super::{Gradient, Objective, Parameters, RecordedStep, Seed, start};
+use crate::contact::{ContactId, ContactJacobian};
+use crate::corrector::JumpProjection;
+use crate::dense::DenseCholesky;
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::{At, Parts, Program, Simulation, projection};
+use crate::state::{Motion, State, StepRecord, Tape};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Versions of rows of a run back begin here: those of a run are smaller.
+const VERSIONS: u64 = 1 << 62;
+
+/// What a run back adds up, and its memory.
+pub(super) struct Back<'b, T: Real> {
+    pub(super) parameters: &'b mut dyn Parameters<T>,
+    pub(super) gaps: BTreeMap<ContactId, T>,
+    pub(super) tangents: Tangents<T>,
+    /// S = G M⁻¹ Gᵀ of the rows recorded.
+    pub(super) projection: JumpProjection<T>,
+    pub(super) prescribed: Vec<usize>,
+    /// The rows that operators and projection belong to, and their version.
+    rows: Option<Arc<ContactJacobian<T>>>,
+    version: u64,
+    /// W of a stage, and its version if it is factorized.
+    pub(super) factor: DenseCholesky<T>,
+    pub(super) factorized: Option<u64>,
+}
+
+impl<T: Real> Back<'_, T> {
+    /// Makes rows those of operators and projection; returns their version.
+    pub(super) fn follow(&mut self, rows: &Arc<ContactJacobian<T>>) -> u64 {
+        if !self.rows.as_ref().is_some_and(|known| Arc::ptr_eq(known, rows)) {
+            self.rows = Some(Arc::clone(rows));
+            self.version += 1;
+            self.projection.reset();
+            self.factorized = None;
+        }
+        self.version
+    }
+
+    /// Sets prescribed dofs, which do not depend on anything, to zero.
+    pub(super) fn hold(&self, motion: &mut Motion<T>) {
+        for field in 0..3 {
+            let values = motion.field_mut(field);
+            self.prescribed.iter().for_each(|&dof| values[dof] = T::zero());
+        }
+    }
+}
+
+/// The derivatives by the values of a state that an objective reads, one entry a dof or a candidate.
+pub(super) struct Seeds<T> {
+    pub(super) rates: [Vec<T>; 2],
+    pub(super) force: Vec<T>,
+    pub(super) impulse: Vec<T>,
+}
+
+/// Goes back through a recorded run.
+pub(super) fn run_backward<T: Real>(
+    run: &mut Simulation<'_, T>,
+    tape: &Tape<T>,
+    objective: &mut dyn Objective<T>,
+    parameters: &mut dyn Parameters<T>,
+) -> Result<Gradient<T>> {
+    if let Some(refusal) = &tape.refusal {
+        let part = format!("the gradient through {}", refusal.what);
+        return Err(Error::Incompatible { part, reason: refusal.reason });
+    }
+    let dofs = run.parts.system.dofs();
+    let Parts { system, linear_solver, together, .. } = &run.parts;
+    let mut back = Back {
+        parameters,
+        gaps: BTreeMap::new(),
+        projection: projection(&**system, &run.constraints, (together, &**linear_solver))?,
+        prescribed: run.parts.system.prescribed().to_vec(),
+        tangents: Tangents::of(&mut *run.parts.system),
+        rows: None,
+        version: VERSIONS,
+        factor: DenseCholesky::default(),
+        factorized: None,
+    };
+    let mut starter = None;
+    // The derivatives by the newest state, and by the states before it.
+    let depth = run.scheme.slots();
+    let mut states: Vec<Motion<T>> = (0..=depth).map(|_| Motion::zero(dofs)).collect();
+    let mut value = T::zero();
+    let mut at = Place { steps: tape.steps.len(), h: run.history.clock.h };
+    for (number, step) in tape.steps.iter().enumerate().rev() {
+        let seeds = at.seed((number + 1, step.h), &step.state, objective, (&mut states[0], &mut value));
+        let [shares, past] = rate_shares(&run.scheme.shifts, step.extrapolates);
+        for field in 0..2 {
+            T::axpy(shares[field], &seeds.rates[field], states[0].field_mut(field + 1));
+            T::axpy(past[field], &seeds.rates[field], states[1].field_mut(field + 1));
+        }
+        step_back((run, &mut starter), &mut back, step, &seeds, &mut states)?;
+    }
+    let h = tape.steps.first().map_or(at.h, |step| step.h);
+    let seeds = at.seed((0, h), &tape.start, objective, (&mut states[0], &mut value));
+    let [displacement, velocity] = start::start_back((run, tape, h), &mut back, seeds, states)?;
+    let gaps = back.gaps.into_iter().collect();
+    Ok(Gradient { value, displacement, velocity, gaps })
+}
+
+/// Shares of the stored v and a in those at the time of the state, and of the state before.
+fn rate_shares<T: Real>(shifts: &[f64; 2], extrapolates: bool) -> [[T; 2]; 2] {
+    let shifts = if extrapolates { *shifts } else { [0.0; 2] };
+    [shifts.map(|shift| T::of(1.0 - shift)), shifts.map(T::of)]
+}
+
+/// How far a run back has come.
+struct Place {
+    steps: usize,
+    h: f64,
+}
+
+impl Place {
+    /// Asks the objective for its term of a state.
+    fn seed<T: Real>(
+        &mut self,
+        (step, h): (usize, f64),
+        state: &State<T>,
+        objective: &mut dyn Objective<T>,
+        (motion, value): (&mut Motion<T>, &mut T),
+    ) -> Seeds<T> {
+        let (dofs, rows) = (motion.u.len(), state.contacts.lambda.len());
+        let zero = |entries: usize| vec![T::zero(); entries];
+        let mut seeds = Seeds { rates: [zero(dofs), zero(dofs)], force: zero(rows), impulse: zero(rows) };
+        let [velocity, acceleration] = &mut seeds.rates;
+        let mut seed = Seed {
+            displacement: &mut motion.u,
+            velocity,
+            acceleration,
+            force: &mut seeds.force,
+            impulse: &mut seeds.impulse,
+        };
+        *value += objective.term(&RecordedStep { state, h, step, steps: self.steps }, &mut seed);
+        seeds
+    }
+}
+
+/// Goes back through a step. On entry `states` holds the derivatives by the state at its end and by older ones, on
+/// return by the state at its start and by older ones.
+fn step_back<T: Real>(
+    (run, starter): (&mut Simulation<'_, T>, &mut Option<Program<T>>),
+    back: &mut Back<'_, T>,
+    step: &StepRecord<T>,
+    seeds: &Seeds<T>,
+    states: &mut Vec<Motion<T>>,
+) -> Result<()> {
+    run.compile_for(step.h)?;
+    if step.starts && starter.is_none() {
+        *starter = Some(run.compiled_starter(step.h, &step.state.motion)?);
+    }
+    let dofs = run.parts.system.dofs();
+    let (count, rows) = (step.stages.len(), seeds.force.len());
+    // States between the stages are read within the step only.
+    states.splice(1..1, (1..count).map(|_| Motion::zero(dofs)));
+    let no_force = vec![T::zero(); rows];
+    let Simulation { parts, compiled, work, .. } = run;
+    let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);
+    for (place, (stage, record)) in program.stages.iter().zip(&step.stages).enumerate().rev() {
+        let mut new = states.remove(0);
+        let force = if place + 1 == count { &seeds.force } else { &no_force };
+        let operator = &mut program.operators[stage.operator];
+        let version = back.follow(&record.rows);
+        operator.follow(version);
+        let system = &mut *parts.system;
+        let Motion { t, u, v, .. } = &record.balance;
+        back.tangents.evaluate(system, (*t, u, v))?;
+        if operator.varies() {
+            operator.factorize(system, step.h, At::state(&record.balance))?;
+            back.factorized = None;
+        }
+        let mut changes = ChangesBack { system, operator, stage, h: step.h, back };
+        changes.undo(record, (force, &seeds.impulse, &step.state.contacts.ids), &mut new, states)?;
+        back.hold(&mut new);
+        let versions = &mut work.contact.rows.problem.versions;
+        let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, back, versions };
+        solved.undo((force, &seeds.impulse), &new, states)?;
+    }
+    states.push(Motion::zero(dofs));
+    Ok(())
+}

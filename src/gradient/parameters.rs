@@ -1,0 +1,110 @@
+//! Parameters of the model: from the derivatives by forces to the derivatives by what the forces depend on.
+
+use crate::error::Result;
+use crate::real::Real;
+use crate::system::System;
+
+/// The motion at which the balance M a = f(t, u, v) + Gᵀ λ of a stage holds.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Balance<'a, T> {
+    /// The time of the force.
+    pub t: f64,
+    /// Displacements, one a dof.
+    pub displacement: &'a [T],
+    /// Velocities, one a dof.
+    pub velocity: &'a [T],
+    /// Accelerations, one a dof.
+    pub acceleration: &'a [T],
+}
+
+/// Parameters θ of the forces, the damping and the mass of a system. A run back calls the methods for every stage; the
+/// implementor adds up dJ/dθ. `()` has no parameters.
+///
+/// ```
+/// use contact_dynamics::gradient::{Balance, Parameters};
+/// use contact_dynamics::{Result, System};
+///
+/// /// dJ/dk of the springs between dofs i and i + 1.
+/// struct Springs(Vec<f64>);
+///
+/// impl Parameters<f64> for Springs {
+///     fn force(&mut self, _: &mut dyn System<f64>, at: &Balance<'_, f64>, w: &[f64]) -> Result<()> {
+///         let u = at.displacement;
+///         for (i, derivative) in self.0.iter_mut().enumerate() {
+///             *derivative -= (w[i + 1] - w[i]) * (u[i + 1] - u[i]);
+///         }
+///         Ok(())
+///     }
+/// }
+/// ```
+pub trait Parameters<T: Real> {
+    /// The forces of a stage, or their change by a correction: adds wᵀ ∂f/∂θ, with w = dJ/df, one a dof. Default:
+    /// forces have no parameters.
+    ///
+    /// # Errors
+    ///
+    /// The host's own, and those of the system.
+    fn force(&mut self, system: &mut dyn System<T>, at: &Balance<'_, T>, w: &[T]) -> Result<()> {
+        let _ = (system, at, w);
+        Ok(())
+    }
+
+    /// Accelerations `a` of a stage, or jumps of them and of velocities: adds −wᵀ ∂M/∂θ a. Default: the mass has no
+    /// parameters.
+    ///
+    /// # Errors
+    ///
+    /// As [`force`](Self::force).
+    fn inertia(&mut self, system: &mut dyn System<T>, a: &[T], w: &[T]) -> Result<()> {
+        let _ = (system, a, w);
+        Ok(())
+    }
+}
+
+impl<T: Real> Parameters<T> for () {}
+
+/// The derivatives by factors of M, of the internal force p, of the damping force d and of the load F, in
+/// s_M M a + s_C d(u, v) + s_K p(u) = s_F F(t) + Gᵀ λ, at the factors 1. For a modulus E of the whole body
+/// `stiffness` is E dJ/dE.
+///
+/// Systems must have an [`external_load`](System::external_load), if they have a load, and a
+/// [`damping_force`](System::damping_force), if they have damping.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Scales<T> {
+    /// dJ/ds_M.
+    pub mass: T,
+    /// dJ/ds_C.
+    pub damping: T,
+    /// dJ/ds_K.
+    pub stiffness: T,
+    /// dJ/ds_F.
+    pub load: T,
+}
+
+impl<T: Real> Parameters<T> for Scales<T> {
+    fn force(&mut self, system: &mut dyn System<T>, at: &Balance<'_, T>, w: &[T]) -> Result<()> {
+        let (u, v) = (at.displacement, at.velocity);
+        let zero = || vec![T::zero(); w.len()];
+        let [mut load, mut damping, mut all] = [zero(), zero(), zero()];
+        system.external_load(at.t, &mut load)?;
+        if let Some(law) = system.damping_force() {
+            law.evaluate(u, v, &mut damping)?;
+        }
+        system.force(at.t, u, v, &mut all)?;
+        for (((&w, &load), &damping), &all) in w.iter().zip(&load).zip(&damping).zip(&all) {
+            self.load += w * load;
+            self.damping -= w * damping;
+            self.stiffness -= w * (load - damping - all);
+        }
+        Ok(())
+    }
+
+    fn inertia(&mut self, system: &mut dyn System<T>, a: &[T], w: &[T]) -> Result<()> {
+        let mut product = vec![T::zero(); w.len()];
+        system.mass().add_product(T::one(), a, &mut product);
+        self.mass -= w.iter().zip(&product).map(|(&w, &product)| w * product).sum::<T>();
+        Ok(())
+    }
+}

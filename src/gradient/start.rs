@@ -1,0 +1,69 @@
+//! The transpose of the state at the start: accelerations from the balance with the contacts that touch, and the past.
+
+use super::Balance;
+use super::backward::{Back, Seeds};
+use crate::error::Result;
+use crate::real::Real;
+use crate::simulation::Simulation;
+use crate::state::{Motion, StartingPast, Tape};
+
+/// From the derivatives by the stored states at the start, newest first, and by what the objective reads there, to
+/// those by the initial displacements and velocities.
+pub(super) fn start_back<T: Real>(
+    (run, tape, h): (&mut Simulation<'_, T>, &Tape<T>, f64),
+    back: &mut Back<'_, T>,
+    seeds: Seeds<T>,
+    states: Vec<Motion<T>>,
+) -> Result<[Vec<T>; 2]> {
+    // v and a at the time of the start. The stored velocity is v + shift h a.
+    let Seeds { rates: [mut v, mut a], force, .. } = seeds;
+    let mut states = states.into_iter();
+    let Some(newest) = states.next() else { return Ok([v, a]) };
+    let mut u = newest.u;
+    T::axpy(T::one(), &newest.v, &mut v);
+    T::axpy(T::one(), &newest.a, &mut a);
+    T::axpy(T::of(run.scheme.shifts[0] * h), &newest.v, &mut a);
+    let reaches = if tape.past == StartingPast::Unknown { 0 } else { run.scheme.depth - 1 };
+    for (k, past) in (1_u32..).zip(states.take(reaches)) {
+        let age = f64::from(k) * h;
+        T::axpy(T::one(), &past.u, &mut u);
+        T::axpy(T::of(-age), &past.u, &mut v);
+        T::axpy(T::one(), &past.v, &mut v);
+        if tape.past == StartingPast::Expanded {
+            T::axpy(T::of(0.5 * age * age), &past.u, &mut a);
+            T::axpy(T::of(-age), &past.v, &mut a);
+            T::axpy(T::one(), &past.a, &mut a);
+        }
+    }
+    back.prescribed.iter().for_each(|&dof| a[dof] = T::zero());
+
+    // M a = f + Gᵀ λ with G a + γ = 0 on the contacts that press.
+    let Simulation { parts, g, .. } = run;
+    let contacts = &tape.start.contacts;
+    let rows: Vec<usize> = (0..contacts.ids.len()).filter(|&row| contacts.lambda[row] != T::zero()).collect();
+    let mut w = a;
+    back.projection.apply_inverse(&mut w)?;
+    if !rows.is_empty() {
+        let rows_at_start = tape.steps.first().and_then(|step| step.stages.first()).map(|stage| &stage.rows);
+        let g = rows_at_start.map_or(&*g, |rows| &**rows);
+        if let Some(rows) = rows_at_start {
+            back.follow(rows);
+        }
+        back.projection.close(g, &rows)?;
+        let mut sigma: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + force[row]).collect();
+        back.projection.solve(&mut sigma);
+        back.projection.push(g, (&rows, &sigma), -T::one(), &mut w)?;
+    }
+    let (system, start) = (&mut *parts.system, &tape.start);
+    let (t, displacement) = (start.time(), start.displacement());
+    let (velocity, acceleration) = (start.velocity(), start.acceleration());
+    back.parameters.force(system, &Balance { t, displacement, velocity, acceleration }, &w)?;
+    back.parameters.inertia(system, acceleration, &w)?;
+    back.tangents.evaluate(system, (t, displacement, velocity))?;
+    back.tangents.add_stiffness(system, -T::one(), &w, &mut u);
+    back.tangents.add_damping(system, -T::one(), &w, &mut v);
+    for &dof in &back.prescribed {
+        (u[dof], v[dof]) = (T::zero(), T::zero());
+    }
+    Ok([u, v])
+}

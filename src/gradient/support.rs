@@ -1,0 +1,57 @@
+//! Which runs are recorded.
+
+use crate::error::{Error, Result};
+use crate::real::Real;
+use crate::simulation::Simulation;
+use crate::state::StartingPast;
+use crate::system::Linearity;
+
+/// Refuses a run that has a part without derivative. Returns which past it starts from.
+pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast> {
+    let refuse =
+        |part: String, reason| Err(Error::Incompatible { part: format!("the gradient through {part}"), reason });
+    if run.history.clock.steps > 0 {
+        return refuse("a run that has begun".into(), "call `record` before its first step");
+    }
+    if !run.parts.together.is_alone() {
+        return refuse("a run over ranks".into(), "record the whole body in one process");
+    }
+    if !run.work.massless.is_empty() {
+        return refuse("dofs without mass".into(), "give them a mass");
+    }
+    for corrector in &run.parts.correctors {
+        if !corrector.effects().is_differentiable {
+            return refuse(format!("the corrector {}", corrector.name()), "choose `PersistencyCorrection`");
+        }
+    }
+    if !run.constraints.tangents().is_empty() {
+        return refuse("friction".into(), "the derivative of sliding friction is not implemented");
+    }
+    if !run.constraints.is_affine() {
+        let reason =
+            "the derivative of rows that turn is not implemented: choose obstacles and gaps that are linear in u";
+        return refuse("rows that follow u".into(), reason);
+    }
+    let nonlinear = run.parts.system.linearity() == Linearity::Nonlinear;
+    let damped = run.parts.system.damping_force().is_some();
+    if nonlinear && damped && !run.parts.correctors.is_empty() {
+        return refuse("nonlinear damping with a correction".into(), "the derivative of C is unknown");
+    }
+    let Simulation { compiled, state, history, .. } = run;
+    if nonlinear && compiled.program.stages.iter().any(|stage| stage.along_path) {
+        return refuse("forces along a path".into(), "choose another scheme");
+    }
+    if !compiled.program.operators.iter().all(|operator| operator.is_symmetric()) {
+        return refuse("an unsymmetric or iterative linear solver".into(), "choose `Automatic`");
+    }
+    let compliant = |row: usize| state.contacts.lambda[row] != T::zero() && run.constraints.laws()[row].is_compliant();
+    if (0..run.constraints.len()).any(compliant) {
+        return refuse("a compliant contact that carries a force at the start".into(), "let it touch in the run");
+    }
+    let past = match history.slots.get(1).filter(|_| history.known > 1) {
+        None => StartingPast::Unknown,
+        Some(past) if past.a.iter().all(|&a| a == T::zero()) => StartingPast::Straight,
+        Some(_) => StartingPast::Expanded,
+    };
+    Ok(past)
+}

@@ -1,0 +1,145 @@
+//! The tape of a run: what each stage leaves for the gradient. Empty boxes in runs that are not recorded.
+
+use super::{Motion, State};
+use crate::contact::{ContactId, ContactJacobian};
+use crate::real::Real;
+use std::sync::Arc;
+
+/// The records of the steps since the start of a run.
+#[derive(Debug)]
+pub(crate) struct Tape<T> {
+    pub(crate) start: State<T>,
+    /// The past at the start that the first step reads.
+    pub(crate) past: StartingPast,
+    pub(crate) steps: Vec<StepRecord<T>>,
+    /// The stages of the step that is being tried.
+    pub(crate) stages: Vec<StageRecord<T>>,
+    /// The rows recorded last, and their version.
+    rows: Option<(u64, Arc<ContactJacobian<T>>)>,
+    pub(crate) refusal: Option<Refusal>,
+}
+
+/// The past states at the start of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StartingPast {
+    /// None is known.
+    Unknown,
+    /// u − k h v, v, 0.
+    Straight,
+    /// Taylor's expansion.
+    Expanded,
+}
+
+/// Something that happened in a run and has no derivative.
+#[derive(Clone, Debug)]
+pub(crate) struct Refusal {
+    pub(crate) what: &'static str,
+    pub(crate) reason: &'static str,
+}
+
+/// An accepted step.
+#[derive(Debug)]
+pub(crate) struct StepRecord<T> {
+    pub(crate) h: f64,
+    /// Whether its stages are those of the one-step scheme with which a multistep scheme starts.
+    pub(crate) starts: bool,
+    pub(crate) stages: Vec<StageRecord<T>>,
+    /// The state at its end.
+    pub(crate) state: State<T>,
+    /// Whether v and a of the state are extrapolated from the stored ones.
+    pub(crate) extrapolates: bool,
+}
+
+/// A solved and corrected stage.
+#[derive(Debug)]
+pub(crate) struct StageRecord<T> {
+    /// The motion at which the balance holds.
+    pub(crate) balance: Motion<T>,
+    pub(crate) rows: Arc<ContactJacobian<T>>,
+    /// The rows that carried a force in the solution.
+    pub(crate) held: Vec<Held<T>>,
+    /// Impulse of a unit multiplier.
+    pub(crate) impulse: T,
+    /// In the order in which they were made.
+    pub(crate) changes: Vec<Change<T>>,
+}
+
+/// A row that carried a force.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Held<T> {
+    pub(crate) row: usize,
+    pub(crate) id: ContactId,
+    /// Change of the gap per change of the force, if the force is a function of the gap where the balance holds.
+    pub(crate) compliance: Option<T>,
+}
+
+/// A change along rows, x ← x + M⁻¹ Gᵀ m, after which these rows have no jump.
+#[derive(Clone, Debug)]
+pub(crate) struct Change<T> {
+    /// 0 for the state of the stage, k for past state k.
+    pub(crate) state: usize,
+    /// 0, 1, 2: u, v, a.
+    pub(crate) field: usize,
+    pub(crate) rows: Vec<usize>,
+    /// m.
+    pub(crate) multipliers: Vec<T>,
+    /// Reported force and impulse per unit of m.
+    pub(crate) force: T,
+    pub(crate) impulse: T,
+    /// Whether damping forces follow.
+    pub(crate) damps: bool,
+}
+
+/// The changes of a stage, as corrections make them.
+#[derive(Debug, Default)]
+pub(crate) struct Changes<T> {
+    pub(crate) list: Vec<Change<T>>,
+    pub(crate) refusal: Option<Refusal>,
+}
+
+impl<T> Changes<T> {
+    /// Refuses a gradient of this run, for the first reason given.
+    pub(crate) fn refuse(&mut self, what: &'static str, reason: &'static str) {
+        self.refusal.get_or_insert(Refusal { what, reason });
+    }
+}
+
+impl<T: Real> Tape<T> {
+    /// An empty tape.
+    pub(crate) fn new(start: State<T>, past: StartingPast) -> Self {
+        Self { start, past, steps: Vec::new(), stages: Vec::new(), rows: None, refusal: None }
+    }
+
+    /// Refuses a gradient of this run, for the first reason given.
+    pub(crate) fn refuse(&mut self, what: &'static str, reason: &'static str) {
+        self.refusal.get_or_insert(Refusal { what, reason });
+    }
+
+    /// A copy of the rows, shared by all stages with the same version.
+    pub(crate) fn rows(&mut self, rows: &ContactJacobian<T>, version: u64) -> Arc<ContactJacobian<T>> {
+        match &self.rows {
+            Some((known, shared)) if *known == version => Arc::clone(shared),
+            _ => {
+                let shared = Arc::new(rows.clone());
+                self.rows = Some((version, Arc::clone(&shared)));
+                shared
+            }
+        }
+    }
+
+    /// Adds the corrections of the stage recorded last.
+    pub(crate) fn correct(&mut self, changes: &mut Changes<T>) {
+        if let Some(stage) = self.stages.last_mut() {
+            stage.changes.append(&mut changes.list);
+        }
+        if let Some(Refusal { what, reason }) = changes.refusal.take() {
+            self.refuse(what, reason);
+        }
+    }
+
+    /// Makes the stages recorded last an accepted step.
+    pub(crate) fn end_step(&mut self, h: f64, starts: bool, state: State<T>, extrapolates: bool) {
+        let stages = std::mem::take(&mut self.stages);
+        self.steps.push(StepRecord { h, starts, stages, state, extrapolates });
+    }
+}

@@ -1,0 +1,3 @@
+//! Gradients of runs: against differences of whole runs, and against closed forms.
+
+mod differences;
