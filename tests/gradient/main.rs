@@ -1,3 +1,5 @@
 //! Gradients of runs: against differences of whole runs, and against closed forms.
 
-mod differences;
+mod compare;
+mod scenes;
+mod throw;

@@ -1,0 +1,122 @@
+//! Bodies with many contacts, large strains, supports, and steps that change.
+
+use crate::compare::{assert_equal, compare};
+use contact_dynamics::contact::Plane;
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::{
+    Bathe, CdLagrange, Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Result,
+    Simulation, StepControl, TimeIntegrator,
+};
+use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::solids::{Material, Solid};
+
+fn schemes() -> Vec<Box<dyn TimeIntegrator>> {
+    vec![
+        Box::new(Newmark::trapezoidal()),
+        Box::new(GeneralizedAlpha::default()),
+        Box::new(Composite),
+        Box::new(Bathe::default()),
+        Box::new(CdLagrange),
+    ]
+}
+
+/// A block of 4 × 2 elements that falls on an inclined plane.
+fn block(at: &[f64]) -> Solid<2> {
+    let material = Material { young: 100.0 * at[2], poisson: 0.3, density: at[0] };
+    Solid::<2>::rectangle([1.0, 0.5], [4, 2], material)
+}
+
+fn contact(solid: &Solid<2>, gap: f64) -> Result<NodesOnObstacle<'static, f64, 2>> {
+    let (s, c) = 0.2_f64.sin_cos();
+    let plane = Plane::new([0.0, -0.0231 - gap / c], [s, c])?;
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][1] < 1e-9).collect();
+    NodesOnObstacle::new(plane, &solid.nodes, &solid.node_dofs(), &bottom)
+}
+
+#[test]
+fn a_block_on_a_plane() {
+    for number in 0..schemes().len() {
+        let build = |at: &[f64]| {
+            let solid = block(at);
+            Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
+                .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
+                .constraint(contact(&solid, at[5])?)
+                .build()
+        };
+        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+        assert_equal(&error, &schemes()[number].name());
+    }
+}
+
+/// Large strains: tangents along the way back.
+#[test]
+fn a_soft_block_on_a_plane() {
+    for law in [Law::StVenantKirchhoff, Law::NeoHookean] {
+        for number in 0..schemes().len() {
+            let build = |at: &[f64]| {
+                let solid = block(at);
+                // The weight is the load: M g with a density of 1.
+                let mut system = Hyperelastic::new(&solid, law);
+                system.particles.weigh([0.0, -3.0 * at[3] / at[0]]);
+                Simulation::builder(system, schemes().swap_remove(number), 0.003)
+                    .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
+                    .constraint(contact(&solid, at[5])?)
+                    .newton(contact_dynamics::Newton::full().tolerances(1e-12, 1e-12)?)
+                    .build()
+            };
+            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+            assert_equal(&error, &format!("{law:?}, {}", schemes()[number].name()));
+        }
+    }
+}
+
+/// A mass between two stops on a spring whose foot is driven, with a redundant third row.
+fn driven(
+    at: &[f64],
+    scheme: Box<dyn TimeIntegrator>,
+    control: Option<StepControl>,
+) -> Result<Simulation<'static, f64>> {
+    let k = 40.0 * at[2];
+    let spring = [(0, 0, k), (0, 1, -k), (1, 0, -k), (1, 1, k)].map(|(i, j, value)| Triplet::new(i, j, value));
+    let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &spring).unwrap();
+    let system = LinearSystem::lumped(vec![at[0]; 2], stiffness)?.rayleigh(0.0, 0.01 * at[1] / at[2])?;
+    let system = system.drive(0, |t: f64| [0.4 * (5.0 * t).sin(), 2.0 * (5.0 * t).cos(), -10.0 * (5.0 * t).sin()])?;
+    let factor = at[3];
+    let system = system.load(move |t, f| f[1] = factor * (3.0 * t).cos());
+    let stops = LinearRows::new()
+        .unilateral(&[(1, 1.0)], 0.3 + at[5])
+        .unilateral(&[(1, 1.0)], 0.3 + at[5])
+        .unilateral(&[(1, -1.0)], 0.31 + at[5]);
+    let mut builder = Simulation::builder(system, scheme, 0.013).velocity(vec![0.0, at[4]]).constraint(stops);
+    if let Some(control) = control {
+        builder = builder.step_control(control);
+    }
+    builder.build()
+}
+
+#[test]
+fn a_driven_mass_between_stops() {
+    for number in 0..schemes().len() {
+        let build = |at: &[f64]| driven(at, schemes().swap_remove(number), None);
+        let error = compare(&build, &|run| run.run_until(1.2, &mut ()).map(drop), (6, 0.1)).unwrap();
+        assert_equal(&error, &schemes()[number].name());
+    }
+}
+
+/// The step size changes between steps, and by the control of the run.
+#[test]
+fn steps_that_change() {
+    let build = |at: &[f64]| driven(at, Box::new(Newmark::trapezoidal()), None);
+    let advance = |run: &mut Simulation<'static, f64>| {
+        for h in [0.013, 0.02, 0.006, 0.013] {
+            run.set_step_size(h)?;
+            (0..25).try_for_each(|_| run.step())?;
+        }
+        run.land_on(1.5, &mut ()).map(drop)
+    };
+    assert_equal(&compare(&build, &advance, (6, 0.1)).unwrap(), "changed by the host");
+    let control = StepControl::halving(0.013 / 16.0).unwrap().contact_changes(1).unwrap();
+    let build = |at: &[f64]| driven(at, Box::new(Newmark::trapezoidal()), Some(control));
+    let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+    assert_equal(&error, "changed by the control");
+}
