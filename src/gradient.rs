@@ -16,7 +16,7 @@ mod start;
 mod support;
 
 pub use objective::{Objective, RecordedStep, Seed};
-pub use parameters::{Balance, Parameters, Scales};
+pub use parameters::{Balance, CompliantContact, Parameters, Scales};
 
 use crate::contact::ContactId;
 use crate::error::{Error, Result};
@@ -56,9 +56,8 @@ impl<T: Real> Simulation<'_, T> {
     /// [`Error::Incompatible`] names the part of the run that has no derivative here, or that is not supported:
     /// friction, rows that turn (curved obstacles, meshes that slide on each other), dofs without mass, ranks,
     /// correctors other than [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices,
-    /// path forces, nonlinear damping with a correction; a run that has taken steps. Other contact laws than
-    /// [`Rigid`](crate::ContactLaw::Rigid), [`Equality`](crate::ContactLaw::Equality),
-    /// [`Penalty`](crate::ContactLaw::Penalty) and [`PowerLaw`](crate::ContactLaw::PowerLaw), and changes of the step
+    /// path forces, nonlinear damping with a correction; a run that has taken steps. Other [contact laws](crate::ContactLaw) than `Rigid`,
+    /// `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, and changes of the step
     /// size with a scheme that reads more than u, v and a of the last state, are refused by
     /// [`gradient`](Self::gradient) if they occurred.
     pub fn record(&mut self) -> Result<()> {

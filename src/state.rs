@@ -24,7 +24,7 @@ pub use contacts::{ContactState, ContactStatus};
 pub(crate) use history::ComputedMotions;
 pub use history::History;
 pub(crate) use overclosures::Overclosures;
-pub(crate) use tape::{Change, Changes, Held, StageRecord, StartingPast, StepRecord, Tape};
+pub(crate) use tape::{Change, Changes, Compliance, Held, StageRecord, StartingPast, StepRecord, Tape};
 
 use crate::contact::BrokenBond;
 use crate::real::Real;

@@ -1,5 +1,6 @@
 //! Parameters of the model: from the derivatives by forces to the derivatives by what the forces depend on.
 
+use crate::contact::{ContactId, ContactLaw};
 use crate::error::Result;
 use crate::real::Real;
 use crate::system::System;
@@ -16,6 +17,22 @@ pub struct Balance<'a, T> {
     pub velocity: &'a [T],
     /// Accelerations, one a dof.
     pub acceleration: &'a [T],
+}
+
+/// A contact under a compliant law that carries a force, where the balance of a stage holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CompliantContact<T> {
+    /// Its name.
+    pub id: ContactId,
+    /// Its law.
+    pub law: ContactLaw,
+    /// Its gap; negative.
+    pub gap: T,
+    /// The rate of its gap.
+    pub rate: T,
+    /// Its force λ.
+    pub force: T,
 }
 
 /// Parameters θ of the forces, the damping and the mass of a system. A run back calls the methods for every stage; the
@@ -60,12 +77,36 @@ pub trait Parameters<T: Real> {
         let _ = (system, a, w);
         Ok(())
     }
+
+    /// The force λ of a contact under a compliant law: adds w ∂λ/∂θ at a fixed gap and rate. Default: laws have no
+    /// parameters.
+    ///
+    /// ```
+    /// use contact_dynamics::ContactLaw;
+    /// use contact_dynamics::gradient::{CompliantContact, Parameters};
+    ///
+    /// /// dJ/dk and dJ/dc of Kelvin and Voigt's law, λ = −k g − c ġ.
+    /// #[derive(Default)]
+    /// struct Stop([f64; 2]);
+    ///
+    /// impl Parameters<f64> for Stop {
+    ///     fn contact(&mut self, contact: &CompliantContact<f64>, w: f64) {
+    ///         if matches!(contact.law, ContactLaw::KelvinVoigt { .. }) {
+    ///             self.0[0] -= w * contact.gap;
+    ///             self.0[1] -= w * contact.rate;
+    ///         }
+    ///     }
+    /// }
+    /// ```
+    fn contact(&mut self, contact: &CompliantContact<T>, w: T) {
+        let _ = (contact, w);
+    }
 }
 
 impl<T: Real> Parameters<T> for () {}
 
-/// The derivatives by factors of M, of the internal force p, of the damping force d and of the load F, in
-/// s_M M a + s_C d(u, v) + s_K p(u) = s_F F(t) + Gᵀ λ, at the factors 1. For a modulus E of the whole body
+/// The derivatives by factors of M, of the internal force p, of the damping force d, of the load F, and of the forces φ
+/// of compliant contacts, in s_M M a + s_C d(u, v) + s_K p(u) = s_F F(t) + Gᵀ λ, λ = s_λ φ(g, ġ), at the factors 1. For a modulus E of the whole body
 /// `stiffness` is E dJ/dE.
 ///
 /// Systems must have an [`external_load`](System::external_load), if they have a load, and a
@@ -81,6 +122,8 @@ pub struct Scales<T> {
     pub stiffness: T,
     /// dJ/ds_F.
     pub load: T,
+    /// dJ/ds_λ.
+    pub contact: T,
 }
 
 impl<T: Real> Parameters<T> for Scales<T> {
@@ -106,5 +149,9 @@ impl<T: Real> Parameters<T> for Scales<T> {
         system.mass().add_product(T::one(), a, &mut product);
         self.mass -= w.iter().zip(&product).map(|(&w, &product)| w * product).sum::<T>();
         Ok(())
+    }
+
+    fn contact(&mut self, contact: &CompliantContact<T>, w: T) {
+        self.contact += w * contact.force;
     }
 }

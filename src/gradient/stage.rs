@@ -3,7 +3,7 @@
 //! Forward, with the weights w of d in the rows and τ in the quantity that contact constrains,
 //!
 //! ```text
-//! A δd − Gᵀ δλ = δr          τ G δd + c δλ = δs
+//! A δd − Gᵀ δλ = δr          τ G δd + c δλ = δs          (τ = w_ū + `lag` w_v̄ for a compliant law)
 //! ```
 //!
 //! Back, from the derivatives d̄ and λ̄, with W = G A⁻¹ Gᵀ:
@@ -12,14 +12,14 @@
 //! (W + c/τ) q = λ̄ + G A⁻¹ d̄          w = A⁻¹ (d̄ − Gᵀ q)          dJ = wᵀ δr + (q/τ)ᵀ δs
 //! ```
 
-use super::Balance;
 use super::backward::Back;
+use super::{Balance, CompliantContact};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::no_response;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::{CompiledStage, Operator};
-use crate::state::{Held, Motion, StageRecord};
+use crate::state::{Compliance, Held, Motion, StageRecord};
 use crate::system::System;
 
 /// A solved stage.
@@ -66,10 +66,16 @@ impl<T: Real> StageBack<'_, '_, T> {
         // Contact on velocities does not read the gap.
         let reads_gap = stage.contact.as_ref().is_none_or(|target| target.forecast.is_none());
         for (held, &q) in record.held.iter().zip(&q) {
-            let imposed = held.compliance.is_none();
-            let constrained = if imposed { &mut target } else { &mut predicted.u };
-            record.rows.scatter(held.row, -q, constrained);
-            if !imposed || reads_gap {
+            match held.compliance {
+                None => record.rows.scatter(held.row, -q, &mut target),
+                Some(Compliance { by_force, lag, law, gap, rate, force }) => {
+                    record.rows.scatter(held.row, -q, &mut predicted.u);
+                    record.rows.scatter(held.row, -q * lag, &mut predicted.v);
+                    let contact = CompliantContact { id: held.id, law, gap, rate, force };
+                    back.parameters.contact(&contact, q * by_force);
+                }
+            }
+            if held.compliance.is_some() || reads_gap {
                 *back.gaps.entry(held.id).or_insert(T::zero()) -= q;
             }
         }
@@ -90,14 +96,17 @@ impl<T: Real> StageBack<'_, '_, T> {
 
     /// c/τ of a row.
     fn compliance(&self, held: &Held<T>) -> T {
-        held.compliance.map_or(T::zero(), |compliance| compliance / self.weight(held))
+        held.compliance.map_or(T::zero(), |compliance| compliance.by_force / self.weight(held))
     }
 
     /// τ of a row.
     fn weight(&self, held: &Held<T>) -> T {
         let Self { stage, .. } = self;
         match (&stage.contact, held.compliance) {
-            (_, Some(_)) => stage.balanced().weights()[0],
+            (_, Some(compliance)) => {
+                let [by_u, by_v, _] = stage.balanced().weights();
+                by_u + compliance.lag * by_v
+            }
             (Some(contact), None) => contact.row.weight,
             (None, None) => stage.recovery.weights()[0],
         }
@@ -144,7 +153,7 @@ impl<T: Real> StageBack<'_, '_, T> {
         self.operator.finish(d, &interface, &forces)?;
         // A force that depends on known displacements alone: c δλ = δs.
         for (k, held) in held.iter().enumerate().filter(|(_, held)| self.weight(held) == T::zero()) {
-            q[k] = held.compliance.map_or(T::zero(), |compliance| (read[k] + g.product(held.row, d)) / compliance);
+            q[k] = held.compliance.map_or(T::zero(), |known| (read[k] + g.product(held.row, d)) / known.by_force);
         }
         Ok(q)
     }

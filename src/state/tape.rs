@@ -1,7 +1,7 @@
 //! The tape of a run: what each stage leaves for the gradient. Empty boxes in runs that are not recorded.
 
 use super::{Motion, State};
-use crate::contact::{ContactId, ContactJacobian};
+use crate::contact::{ContactId, ContactJacobian, ContactLaw};
 use crate::real::Real;
 use std::sync::Arc;
 
@@ -69,8 +69,19 @@ pub(crate) struct StageRecord<T> {
 pub(crate) struct Held<T> {
     pub(crate) row: usize,
     pub(crate) id: ContactId,
-    /// Change of the gap per change of the force, if the force is a function of the gap where the balance holds.
-    pub(crate) compliance: Option<T>,
+    /// If its law is compliant.
+    pub(crate) compliance: Option<Compliance<T>>,
+}
+
+/// A force that is a function of the gap, and of its rate, where the balance holds: δg + `lag` δġ + `by_force` δλ = 0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Compliance<T> {
+    pub(crate) by_force: T,
+    pub(crate) lag: T,
+    pub(crate) law: ContactLaw,
+    pub(crate) gap: T,
+    pub(crate) rate: T,
+    pub(crate) force: T,
 }
 
 /// A change along rows, x ← x + M⁻¹ Gᵀ m, after which these rows have no jump.

@@ -4,9 +4,9 @@ use contact_dynamics::gradient::{RecordedStep, Scales, Seed};
 use contact_dynamics::verify::{self, GradientError};
 use contact_dynamics::{Result, Simulation};
 
-/// Factors of M, C, K, F, of the initial velocities, and a distance added to all gaps.
-pub(crate) const AT: [f64; 6] = [1.0, 1.0, 1.0, 1.0, 1.0, 0.0];
-pub(crate) const NAMES: [&str; 6] = ["mass", "damping", "stiffness", "load", "velocity", "gap"];
+/// Factors of M, C, K, F, of the initial velocities and of compliant forces, and a distance added to all gaps.
+pub(crate) const AT: [f64; 7] = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0];
+pub(crate) const NAMES: [&str; 7] = ["mass", "damping", "stiffness", "load", "velocity", "contact", "gap"];
 
 /// Makes runs with such factors.
 pub(crate) type Build<'b> = dyn Fn(&[f64]) -> Result<Simulation<'static, f64>> + 'b;
@@ -30,9 +30,9 @@ pub(crate) fn compare(
     let gradient = run.gradient(&mut objective, &mut scales)?;
     let velocity = gradient.velocity.iter().zip(&velocities).map(|(by, v)| by * v).sum();
     let gap = gradient.gaps.iter().map(|&(_, by)| by).sum();
-    let all = [scales.mass, scales.damping, scales.stiffness, scales.load, velocity, gap];
+    let all = [scales.mass, scales.damping, scales.stiffness, scales.load, velocity, scales.contact, gap];
     let value = |at: &[f64]| Ok(recorded(at)?.gradient(&mut objective, &mut ())?.value);
-    let steps = [1e-5, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5 * size];
+    let steps = [1e-5, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5 * size];
     verify::gradient(value, &AT[..varied], &all[..varied], &steps[..varied])
 }
 

@@ -40,10 +40,10 @@ fn a_block_on_a_plane() {
             let solid = block(at);
             Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
                 .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
-                .constraint(contact(&solid, at[5])?)
+                .constraint(contact(&solid, at[6])?)
                 .build()
         };
-        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
         assert_equal(&error, &schemes()[number].name());
     }
 }
@@ -60,11 +60,11 @@ fn a_soft_block_on_a_plane() {
                 system.particles.weigh([0.0, -3.0 * at[3] / at[0]]);
                 Simulation::builder(system, schemes().swap_remove(number), 0.003)
                     .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
-                    .constraint(contact(&solid, at[5])?)
+                    .constraint(contact(&solid, at[6])?)
                     .newton(contact_dynamics::Newton::full().tolerances(1e-12, 1e-12)?)
                     .build()
             };
-            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
             assert_equal(&error, &format!("{law:?}, {}", schemes()[number].name()));
         }
     }
@@ -84,9 +84,9 @@ fn driven(
     let factor = at[3];
     let system = system.load(move |t, f| f[1] = factor * (3.0 * t).cos());
     let stops = LinearRows::new()
-        .unilateral(&[(1, 1.0)], 0.3 + at[5])
-        .unilateral(&[(1, 1.0)], 0.3 + at[5])
-        .unilateral(&[(1, -1.0)], 0.31 + at[5]);
+        .unilateral(&[(1, 1.0)], 0.3 + at[6])
+        .unilateral(&[(1, 1.0)], 0.3 + at[6])
+        .unilateral(&[(1, -1.0)], 0.31 + at[6]);
     let mut builder = Simulation::builder(system, scheme, 0.013).velocity(vec![0.0, at[4]]).constraint(stops);
     if let Some(control) = control {
         builder = builder.step_control(control);
@@ -98,7 +98,7 @@ fn driven(
 fn a_driven_mass_between_stops() {
     for number in 0..schemes().len() {
         let build = |at: &[f64]| driven(at, schemes().swap_remove(number), None);
-        let error = compare(&build, &|run| run.run_until(1.2, &mut ()).map(drop), (6, 0.1)).unwrap();
+        let error = compare(&build, &|run| run.run_until(1.2, &mut ()).map(drop), (7, 0.1)).unwrap();
         assert_equal(&error, &schemes()[number].name());
     }
 }
@@ -114,9 +114,9 @@ fn steps_that_change() {
         }
         run.land_on(1.5, &mut ()).map(drop)
     };
-    assert_equal(&compare(&build, &advance, (6, 0.1)).unwrap(), "changed by the host");
+    assert_equal(&compare(&build, &advance, (7, 0.1)).unwrap(), "changed by the host");
     let control = StepControl::halving(0.013 / 16.0).unwrap().contact_changes(1).unwrap();
     let build = |at: &[f64]| driven(at, Box::new(Newmark::trapezoidal()), Some(control));
-    let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (6, 0.1)).unwrap();
+    let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
     assert_equal(&error, "changed by the control");
 }

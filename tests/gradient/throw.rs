@@ -37,7 +37,7 @@ impl Throw {
             end: 1.3,
             load: -0.4,
             speed: -0.5,
-            varied: 6,
+            varied: 7,
         }
     }
 
@@ -66,7 +66,7 @@ impl Throw {
         let (factor, mean) = (at[3], self.load);
         let system = system.load(move |t, f| f[n] = factor * (mean + 0.3 * (2.0 * t).sin()));
         let velocity = (0..=n).map(|i| at[4] * (self.speed + 0.02 * i as f64)).collect();
-        let contact = LinearRows::new().row(self.law, &[(0, 1.0)], self.gap + at[5]);
+        let contact = LinearRows::new().row(scaled(self.law, at[5]), &[(0, 1.0)], self.gap + at[6]);
         Simulation::builder(system, scheme, self.h).velocity(velocity).constraint(contact).build()
     }
 
@@ -109,16 +109,37 @@ fn damped_bodies() {
 
 #[test]
 fn compliant_contact() {
-    let law = ContactLaw::Penalty { stiffness: 30.0 };
-    assert!(compare_all(&Throw { law, ..Throw::new() }, "penalty") > 30);
-    let law = ContactLaw::PowerLaw { stiffness: 100.0, exponent: 1.5 };
-    assert!(compare_all(&Throw { law, ..Throw::new() }, "power law") > 30);
+    for law in [
+        ContactLaw::Penalty { stiffness: 30.0 },
+        ContactLaw::PowerLaw { stiffness: 100.0, exponent: 1.5 },
+        ContactLaw::KelvinVoigt { stiffness: 30.0, damping: 0.3 },
+        ContactLaw::HuntCrossley { stiffness: 100.0, exponent: 1.5, dissipation: 0.8 },
+    ] {
+        assert!(compare_all(&Throw { law, ..Throw::new() }, &format!("{law:?}")) > 30);
+    }
+}
+
+/// A compliant law with a factor.
+fn scaled(law: ContactLaw, factor: f64) -> ContactLaw {
+    match law {
+        ContactLaw::Penalty { stiffness } => ContactLaw::Penalty { stiffness: factor * stiffness },
+        ContactLaw::PowerLaw { stiffness, exponent } => {
+            ContactLaw::PowerLaw { stiffness: factor * stiffness, exponent }
+        }
+        ContactLaw::KelvinVoigt { stiffness, damping } => {
+            ContactLaw::KelvinVoigt { stiffness: factor * stiffness, damping: factor * damping }
+        }
+        ContactLaw::HuntCrossley { stiffness, exponent, dissipation } => {
+            ContactLaw::HuntCrossley { stiffness: factor * stiffness, exponent, dissipation }
+        }
+        rigid => rigid,
+    }
 }
 
 /// Tied to the wall, and pressed to it: contacts carry forces at the start.
 #[test]
 fn contact_at_the_start() {
-    let throw = Throw { gap: 0.0, speed: 0.0, varied: 5, ..Throw::new() };
+    let throw = Throw { gap: 0.0, speed: 0.0, varied: 6, ..Throw::new() };
     assert!(compare_all(&Throw { law: ContactLaw::Equality, ..throw }, "tied") > 30);
     assert!(compare_all(&throw, "pressed") > 30);
 }

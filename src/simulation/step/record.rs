@@ -1,31 +1,55 @@
 //! A solved stage on the tape of a recorded run.
 
-use crate::contact::ContactLaw;
+use crate::contact::{ContactLaw, GapRates};
 use crate::corrector::Gaps;
+use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::half_digits;
 use crate::simulation::stage::StageSolve;
-use crate::state::{Held, Motion, StageRecord, Tape};
+use crate::state::{Compliance, Held, Motion, StageRecord, Tape};
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Records the solution d of the stage, before corrections. `impulse` is the impulse of a unit multiplier.
-    pub(super) fn record(&self, tape: &mut Tape<T>, d: &[T], impulse: T) {
+    pub(super) fn record(&mut self, tape: &mut Tape<T>, d: &[T], impulse: T) -> Result<()> {
+        let balance = self.balance(d);
+        let mut readings = Vec::new();
         let mut held = Vec::new();
-        for (row, &force) in self.contact.trial.lambda_raw.iter().enumerate().take(self.constraints.len()) {
-            let law = self.constraints.law(row);
+        for row in 0..self.constraints.len() {
+            let (law, force) = (self.constraints.law(row), self.contact.trial.lambda_raw[row]);
             if force == T::zero() && !law.is_equality() {
                 continue;
             }
-            match compliance(&law, force) {
-                Some(compliance) => held.push(Held { row, id: self.constraints.ids[row], compliance }),
-                None => tape.refuse(
-                    "contact under a law other than `Rigid`, `Equality`, `Penalty` and `PowerLaw`",
-                    "its derivative is not implemented",
-                ),
-            }
+            let compliance = match law {
+                ContactLaw::Rigid | ContactLaw::Equality => None,
+                ContactLaw::Penalty { .. }
+                | ContactLaw::PowerLaw { .. }
+                | ContactLaw::KelvinVoigt { .. }
+                | ContactLaw::HuntCrossley { .. } => {
+                    if readings.is_empty() {
+                        readings = self.readings(&balance)?;
+                    }
+                    let (gap, rate) = readings[row];
+                    Some(compliance(law, [gap, rate + self.g.product(row, &balance.v)], force))
+                }
+                _ => {
+                    tape.refuse("this contact law", "its derivative is not implemented");
+                    continue;
+                }
+            };
+            held.push(Held { row, id: self.constraints.ids[row], compliance });
         }
         let rows = tape.rows(self.g, self.constraints.version());
-        let balance = self.balance(d);
         tape.stages.push(StageRecord { balance, rows, held, impulse, changes: Vec::new() });
+        Ok(())
+    }
+
+    /// Gap of each row, and the part of its rate that does not come from velocities, where the balance holds.
+    fn readings(&mut self, balance: &Motion<T>) -> Result<Vec<(T, T)>> {
+        let rows = self.constraints.len();
+        let (mut gaps, mut rates) = (vec![T::zero(); rows], vec![GapRates::default(); rows]);
+        self.constraints.finite_gaps(balance.t, &balance.u, &mut gaps)?;
+        self.constraints.finite_rates(balance.t, &balance.u, &balance.v, &mut rates)?;
+        Ok(gaps.into_iter().zip(rates.into_iter().map(|rates| rates.rate)).collect())
     }
 
     /// The motion at which the balance of the stage holds.
@@ -47,16 +71,13 @@ impl<T: Real> StageSolve<'_, '_, T> {
     }
 }
 
-/// The change of the gap per change of the force of a law; none inside for a rigid law, none at all for a law without
-/// derivative.
-fn compliance<T: Real>(law: &ContactLaw, force: T) -> Option<Option<T>> {
-    match *law {
-        ContactLaw::Rigid | ContactLaw::Equality => Some(None),
-        ContactLaw::Penalty { stiffness } => Some(Some(T::of(stiffness).recip())),
-        ContactLaw::PowerLaw { stiffness, exponent } => {
-            let depth = (force / T::of(stiffness)).powf(T::of(exponent.recip()));
-            Some(Some(depth / (T::of(exponent) * force)))
-        }
-        _ => None,
+/// A compliant law linearized at the force of a row with this gap and rate.
+fn compliance<T: Real>(law: ContactLaw, [gap, rate]: [T; 2], force: T) -> Compliance<T> {
+    let known = Compliance { by_force: T::zero(), lag: T::zero(), law, gap, rate, force };
+    // A dashpot that begins to press bears a part of its force at a gap of zero: it is rigid then.
+    if (law.force(gap, -rate) - force).abs() > half_digits::<T>() * force {
+        return known;
     }
+    let [by_depth, by_rate] = law.slopes(force.value(), -gap.value()).map(T::of);
+    Compliance { by_force: by_depth.recip(), lag: by_rate / by_depth, ..known }
 }
