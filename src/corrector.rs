@@ -18,12 +18,12 @@ mod zero_acceleration;
 
 pub(crate) use crate::contact::{ErasedGaps, Gaps};
 pub(crate) use crate::contact_solver::{contact_error, no_response};
-pub(crate) use crate::state::Backup;
+pub(crate) use crate::state::{Backup, slides};
 pub(crate) use buffers::Buffers;
 pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
 pub(crate) use correction::{Before, Bodies, Erased, Past, Scheme};
-pub(crate) use jump_problem::{Block, JumpProblem, slides};
+pub(crate) use jump_problem::{Block, JumpProblem};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
 pub use nonsmooth_splitting::NonsmoothSplitting;

@@ -4,10 +4,11 @@
 //! - [`parameters`](Parameters): what the host wants derivatives by.
 //! - `support`: which runs are recorded; [`Simulation::record`] begins, [`Simulation::gradient`] goes back.
 //! - `backward`: from the last step to the first; `stage`: the transpose of a stage, `changes`: of its corrections,
-//!   `start`: of the state at the start; `products`: transposed products with K and C.
+//!   `start`: of the state at the start; `conditions`: of contact conditions, `products`: products with K and C.
 
 mod backward;
 mod changes;
+mod conditions;
 mod objective;
 mod parameters;
 mod products;
@@ -37,6 +38,8 @@ pub struct Gradient<T> {
     /// The derivative by a constant added to the gap of a contact during the whole run, for each contact that has
     /// carried a force; ascending.
     pub gaps: Vec<(ContactId, T)>,
+    /// The derivative by the friction coefficient of each contact that has slid; ascending.
+    pub friction: Vec<(ContactId, T)>,
 }
 
 impl<T: Real> Gradient<T> {

@@ -55,8 +55,6 @@ pub(super) struct Removal<T> {
     /// The rows of the contacts, tangential rows included, and their multipliers.
     pub(super) rows: Vec<usize>,
     pub(super) multipliers: Vec<T>,
-    /// Whether the jump of a row is removed: all but those of touching rows that separate.
-    pub(super) held: Vec<bool>,
     /// The multipliers without those of tangential rows, one per contact.
     pub(super) normal: Vec<T>,
 }
@@ -155,9 +153,8 @@ impl<T: Real> Buffers<T> {
         problem.make_room(rows);
         reserve(&mut [closed, engaged, opened, released, &mut given.rows, &mut given.group], rows);
         reserve(&mut [reported, impacts, &mut given.energies, &mut given.impulses, &mut given.shares], rows);
-        for Removal { rows: own, multipliers, held, normal } in [impulses, forces] {
+        for Removal { rows: own, multipliers, normal } in [impulses, forces] {
             reserve(&mut [own], rows);
-            reserve(&mut [held], rows);
             reserve(&mut [multipliers, normal], rows);
         }
         if !damping.change.is_empty() {

@@ -11,11 +11,6 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::{half_digits, rounding, share_of_rounding};
 
-/// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
-pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
-    friction >= (T::one() - half_digits::<T>()) * bound.max(T::zero())
-}
-
 /// A contact of the problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Block<T> {

@@ -21,6 +21,7 @@ const VERSIONS: u64 = 1 << 62;
 pub(super) struct Back<'b, T: Real> {
     pub(super) parameters: &'b mut dyn Parameters<T>,
     pub(super) gaps: BTreeMap<ContactId, T>,
+    pub(super) friction: BTreeMap<ContactId, T>,
     pub(super) tangents: Tangents<T>,
     /// S = G M⁻¹ Gᵀ of the rows recorded.
     pub(super) projection: JumpProjection<T>,
@@ -77,6 +78,7 @@ pub(super) fn run_backward<T: Real>(
     let mut back = Back {
         parameters,
         gaps: BTreeMap::new(),
+        friction: BTreeMap::new(),
         projection: projection(&**system, &run.constraints, (together, &**linear_solver))?,
         prescribed: run.parts.system.prescribed().to_vec(),
         tangents: Tangents::of(&mut *run.parts.system),
@@ -103,8 +105,8 @@ pub(super) fn run_backward<T: Real>(
     let h = tape.steps.first().map_or(at.h, |step| step.h);
     let seeds = at.seed((0, h), &tape.start, objective, (&mut states[0], &mut value));
     let [displacement, velocity] = start::start_back((run, tape, h), &mut back, seeds, states)?;
-    let gaps = back.gaps.into_iter().collect();
-    Ok(Gradient { value, displacement, velocity, gaps })
+    let [gaps, friction] = [back.gaps, back.friction].map(|map| map.into_iter().collect());
+    Ok(Gradient { value, displacement, velocity, gaps, friction })
 }
 
 /// Shares of the stored v and a in those at the time of the state, and of the state before.
@@ -177,12 +179,12 @@ fn step_back<T: Real>(
             operator.factorize(system, step.h, At::state(&record.balance))?;
             back.factorized = None;
         }
-        let mut changes = ChangesBack { system, operator, stage, h: step.h, back };
-        changes.undo(record, (force, &seeds.impulse, &step.state.contacts.ids), &mut new, states)?;
+        let mut changes = ChangesBack { system, operator, stage, h: step.h, contacts: &step.state.contacts, back };
+        let raw = changes.undo(record, (force, &seeds.impulse), &mut new, states)?;
         back.hold(&mut new);
         let versions = &mut work.contact.rows.problem.versions;
         let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, back, versions };
-        solved.undo((force, &seeds.impulse), &new, states)?;
+        solved.undo((&raw, &seeds.impulse), &new, states)?;
     }
     states.push(Motion::zero(dofs));
     Ok(())

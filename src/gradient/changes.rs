@@ -2,11 +2,13 @@
 
 use super::Balance;
 use super::backward::Back;
-use crate::contact::{ContactId, ContactJacobian};
+use super::conditions::{are_closed, solve_transposed};
+use crate::contact::ContactJacobian;
+use crate::contact_solver::no_response;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::{CompiledStage, Operator};
-use crate::state::{Change, Motion, StageRecord};
+use crate::state::{Change, ContactState, Motion, Rule, StageRecord};
 use crate::system::System;
 
 /// A corrected stage.
@@ -15,19 +17,21 @@ pub(super) struct ChangesBack<'s, 'b, T: Real> {
     pub(super) operator: &'s mut Operator<T>,
     pub(super) stage: &'s CompiledStage<T>,
     pub(super) h: f64,
+    pub(super) contacts: &'s ContactState<T>,
     pub(super) back: &'s mut Back<'b, T>,
 }
 
 impl<T: Real> ChangesBack<'_, '_, T> {
-    /// From the derivatives by the corrected states to those by the states before the corrections. Force and impulse
-    /// hold the derivatives by the reported values of the contacts, which have the names `ids`.
+    /// From the derivatives by the corrected states to those by the states before the corrections, and by raw
+    /// multipliers, which are returned. Force and impulse hold the derivatives by the reported values of the contacts.
     pub(super) fn undo(
         &mut self,
         record: &StageRecord<T>,
-        (force, impulse, ids): (&[T], &[T], &[ContactId]),
+        (force, impulse): (&[T], &[T]),
         new: &mut Motion<T>,
         past: &mut [Motion<T>],
-    ) -> Result<()> {
+    ) -> Result<Vec<T>> {
+        let mut raw = force.to_vec();
         for change in record.changes.iter().rev().filter(|change| !change.rows.is_empty()) {
             let damped = if change.damps { Some(self.damped(&new.a)?) } else { None };
             let motion = match change.state {
@@ -35,14 +39,26 @@ impl<T: Real> ChangesBack<'_, '_, T> {
                 k => &mut past[k - 1],
             };
             let read = |row: usize| change.force * force[row] + change.impulse * impulse[row];
-            let sigma = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
-            if change.field == 0 {
-                for (&row, &sigma) in change.rows.iter().zip(&sigma) {
-                    *self.back.gaps.entry(ids[row]).or_insert(T::zero()) -= sigma;
+            let psi = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
+            for (k, (&row, rule)) in change.rows.iter().zip(&change.rules).enumerate() {
+                match *rule {
+                    Rule::Closed if change.field == 0 && !record.rows.is_tangential(row) => {
+                        *self.back.gaps.entry(self.contacts.ids[row]).or_insert(T::zero()) -= psi[k];
+                    }
+                    // A past displacement is moved to that of the state where the contact sticks.
+                    Rule::Closed if change.field == 0 => record.rows.scatter(row, psi[k], &mut new.u),
+                    Rule::Closed => {}
+                    Rule::Unloaded => raw[row] -= change.share * psi[k],
+                    Rule::Slides { normal, share } => {
+                        raw[row] -= change.share * psi[k];
+                        raw[change.rows[normal]] += share * change.share * psi[k];
+                    }
                 }
             }
+            let name = |k: usize| self.contacts.ids[self.contacts.tangents.owner(change.rows[k])];
+            self.back.add_friction(&change.rules, |k| (name(k), psi[k]), |k| change.totals[k]);
         }
-        Ok(())
+        Ok(raw)
     }
 
     /// The derivatives by the damping forces that follow from those by accelerations.
@@ -65,7 +81,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         }
     }
 
-    /// Undoes a change in the derivatives `x`; returns σ, the derivatives by γ. `read` are the derivatives by a unit
+    /// Undoes a change in the derivatives `x`; returns ψ of its conditions. `read` are the derivatives by a unit
     /// of the multiplier of a row.
     fn remove(
         &mut self,
@@ -76,16 +92,17 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         read: impl Fn(usize) -> T,
     ) -> Result<Vec<T>> {
         let Self { system, back, .. } = self;
-        let Change { rows, multipliers, .. } = change;
+        let Change { rows, rules, multipliers, .. } = change;
         // The derivatives by the change itself.
         let mut w = x.to_vec();
         if let Some(damped) = damped {
             back.tangents.add_damping(&**system, -damped.share, &damped.w, &mut w);
         }
         back.projection.apply_inverse(&mut w)?;
-        back.projection.close(g, rows)?;
-        let mut sigma: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + read(row)).collect();
-        back.projection.solve(&mut sigma);
+        let mut psi: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + read(row)).collect();
+        back.solve_jumps((g, rows), rules, &mut psi, self.contacts)?;
+        let sigma: Vec<T> =
+            rules.iter().zip(&psi).map(|(rule, &psi)| if *rule == Rule::Closed { psi } else { T::zero() }).collect();
         rows.iter().zip(&sigma).for_each(|(&row, &sigma)| g.scatter(row, -sigma, x));
         back.projection.push(g, (rows, &sigma), -T::one(), &mut w)?;
         let mut moved = vec![T::zero(); w.len()];
@@ -94,7 +111,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         if let Some(damped) = damped {
             self.differentiate_damping(damped, &moved)?;
         }
-        Ok(sigma)
+        Ok(psi)
     }
 
     /// The derivatives by the parameters in (M, or A h²/w_ā) δa = −C δv.
@@ -127,4 +144,28 @@ struct Damped<T> {
     share: T,
     /// (M or A)⁻¹ times the derivatives by accelerations.
     w: Vec<T>,
+}
+
+impl<T: Real> Back<'_, T> {
+    /// Solves for ψ of the conditions of jumps, in place of x̄.
+    pub(super) fn solve_jumps(
+        &mut self,
+        (g, rows): (&ContactJacobian<T>, &[usize]),
+        rules: &[Rule<T>],
+        x: &mut [T],
+        contacts: &ContactState<T>,
+    ) -> Result<()> {
+        let Self { projection, factor, factorized, .. } = self;
+        if are_closed(rules.iter().copied()) {
+            projection.close(g, rows)?;
+            projection.solve(x);
+            return Ok(());
+        }
+        let mut s = Vec::new();
+        projection.assemble(g, rows, &mut s)?;
+        *factorized = None;
+        let (size, t) = (rows.len(), 0.0);
+        let refuse = |k: usize| no_response(t, contacts.ids[contacts.tangents.owner(rows[k])]);
+        solve_transposed(factor, rules, (|i, j| s[i * size + j], |_| T::zero()), x).map_err(refuse)
+    }
 }

@@ -11,15 +11,17 @@
 //! ```text
 //! (W + c/τ) q = λ̄ + G A⁻¹ d̄          w = A⁻¹ (d̄ − Gᵀ q)          dJ = wᵀ δr + (q/τ)ᵀ δs
 //! ```
+//!
+//! With friction the conditions are those of `conditions`.
 
 use super::backward::Back;
+use super::conditions::solve_transposed;
 use super::{Balance, CompliantContact};
-use crate::contact::ContactJacobian;
 use crate::contact_solver::no_response;
 use crate::error::Result;
 use crate::real::Real;
-use crate::simulation::{CompiledStage, Operator};
-use crate::state::{Compliance, Held, Motion, StageRecord};
+use crate::simulation::{CompiledStage, Operator, SlipSource, slip_source};
+use crate::state::{Compliance, Held, Motion, Rule, StageRecord};
 use crate::system::System;
 
 /// A solved stage.
@@ -34,17 +36,11 @@ pub(super) struct StageBack<'s, 'b, T: Real> {
 }
 
 impl<T: Real> StageBack<'_, '_, T> {
-    /// From the derivatives by the new state, by reported forces and by impulses to those by past states, gaps and
+    /// From the derivatives by the new state, by raw multipliers and by impulses to those by past states, gaps and
     /// parameters.
-    pub(super) fn undo(
-        &mut self,
-        (force, impulse): (&[T], &[T]),
-        new: &Motion<T>,
-        past: &mut [Motion<T>],
-    ) -> Result<()> {
+    pub(super) fn undo(&mut self, (raw, impulse): (&[T], &[T]), new: &Motion<T>, past: &mut [Motion<T>]) -> Result<()> {
         let record = self.record;
-        let read: Vec<T> =
-            record.held.iter().map(|held| force[held.row] + record.impulse * impulse[held.row]).collect();
+        let read: Vec<T> = record.held.iter().map(|held| raw[held.row] + record.impulse * impulse[held.row]).collect();
         let mut d = vec![T::zero(); new.u.len()];
         for (field, weight) in self.stage.recovery.weights().into_iter().enumerate() {
             T::axpy(weight, new.field(field), &mut d);
@@ -62,16 +58,20 @@ impl<T: Real> StageBack<'_, '_, T> {
         back.tangents.add_stiffness(&**system, -T::one(), &w, &mut predicted.u);
         back.tangents.add_damping(&**system, -T::one(), &w, &mut predicted.v);
         system.mass().add_product(-T::one(), &w, &mut predicted.a);
-        let mut target = vec![T::zero(); w.len()];
+        let [mut target, mut slip] = [0; 2].map(|_| vec![T::zero(); w.len()]);
         // Contact on velocities does not read the gap.
         let reads_gap = stage.contact.as_ref().is_none_or(|target| target.forecast.is_none());
         for (held, &q) in record.held.iter().zip(&q) {
             match held.compliance {
+                _ if held.is_slip => {
+                    record.rows.scatter(held.row, -q, &mut slip);
+                    continue;
+                }
                 None => record.rows.scatter(held.row, -q, &mut target),
-                Some(Compliance { by_force, lag, law, gap, rate, force }) => {
+                Some(Compliance { by_force, lag, law, gap, rate }) => {
                     record.rows.scatter(held.row, -q, &mut predicted.u);
                     record.rows.scatter(held.row, -q * lag, &mut predicted.v);
-                    let contact = CompliantContact { id: held.id, law, gap, rate, force };
+                    let contact = CompliantContact { id: held.id, law, gap, rate, force: held.force };
                     back.parameters.contact(&contact, q * by_force);
                 }
             }
@@ -79,30 +79,105 @@ impl<T: Real> StageBack<'_, '_, T> {
                 *back.gaps.entry(held.id).or_insert(T::zero()) -= q;
             }
         }
-        let mut recovered = Motion::zero(0);
+        let mut recovered = new.clone();
         match &stage.contact {
             Some(contact) => contact.row.transpose(&target, past),
             // Contact is imposed on the displacements of the state.
-            None => {
-                recovered.u = new.u.clone();
-                T::axpy(T::one(), &target, &mut recovered.u);
+            None => T::axpy(T::one(), &target, &mut recovered.u),
+        }
+        if record.held.iter().any(|held| held.is_slip) {
+            match (slip_source(stage, false).0, &stage.contact) {
+                (SlipSource::Velocity(scale), _) => T::axpy(scale, &slip, &mut recovered.v),
+                (SlipSource::Target, Some(contact)) => contact.row.transpose(&slip, past),
+                (SlipSource::Target | SlipSource::WayAhead | SlipSource::Way, _) => stage.way.transpose(&slip, past),
             }
         }
-        let moved = if stage.contact.is_some() { &new.u } else { &recovered.u };
-        stage.recovery.transpose([moved, &new.v, &new.a], past);
+        stage.recovery.transpose([&recovered.u, &recovered.v, &recovered.a], past);
         stage.balanced().transpose([&predicted.u, &predicted.v, &predicted.a], past);
         Ok(())
     }
 
-    /// c/τ of a row.
-    fn compliance(&self, held: &Held<T>) -> T {
-        held.compliance.map_or(T::zero(), |compliance| compliance.by_force / self.weight(held))
+    /// d̄ becomes w; returns the derivatives by δs: q/τ, or Pᵀ ψ.
+    fn solve(&mut self, read: &[T], d: &mut [T]) -> Result<Vec<T>> {
+        let size = self.operator.interface();
+        let [mut interface, mut response, mut forces] = [0; 3].map(|_| vec![T::zero(); size]);
+        self.operator.begin(d, &mut interface)?;
+        let held = &self.record.held;
+        let weights: Vec<T> = held.iter().map(|held| self.weight(held)).collect();
+        // A force that depends on known displacements alone follows below, unless it has friction.
+        let has_slip = held.iter().any(|held| held.is_slip);
+        let solved: Vec<usize> = (0..held.len()).filter(|&k| has_slip || weights[k] != T::zero()).collect();
+        let rows: Vec<usize> = solved.iter().map(|&k| held[k].row).collect();
+        let mut q = vec![T::zero(); held.len()];
+        if !rows.is_empty() {
+            let g = &*self.record.rows;
+            let mut multipliers: Vec<T> =
+                solved.iter().map(|&k| read[k] + g.interface_product(held[k].row, &interface)).collect();
+            match has_slip {
+                true => self.solve_with_friction(&rows, &weights, &mut multipliers)?,
+                false => self.solve_closed(&rows, &weights, &solved, &mut multipliers)?,
+            }
+            for (&k, multiplier) in solved.iter().zip(&mut multipliers) {
+                q[k] = *multiplier;
+                *multiplier *= weights[k];
+            }
+            self.operator.answer(g, (&rows, &multipliers), &mut forces, &mut response);
+            T::axpy(-T::one(), &response, &mut interface);
+            forces.iter_mut().for_each(|force| *force = -*force);
+        }
+        self.operator.finish(d, &interface, &forces)?;
+        if !has_slip {
+            // c δλ = δs.
+            let g = &*self.record.rows;
+            for (k, held) in held.iter().enumerate().filter(|&(k, _)| weights[k] == T::zero()) {
+                q[k] = held.compliance.map_or(T::zero(), |known| (read[k] + g.product(held.row, d)) / known.by_force);
+            }
+        }
+        Ok(q)
+    }
+
+    /// Solves (W + c/τ) q = x for closed rows; x becomes q/τ. W is factorized unless it was the last one.
+    fn solve_closed(&mut self, rows: &[usize], weights: &[T], solved: &[usize], x: &mut [T]) -> Result<()> {
+        let Self { operator, record, back: Back { factor, factorized, .. }, versions, .. } = self;
+        let compliance = |k: usize| {
+            let known = record.held[solved[k]].compliance;
+            known.map_or(T::zero(), |known| known.by_force / weights[solved[k]])
+        };
+        let (w, version) = operator.delassus(&record.rows, rows, compliance, versions)?;
+        if *factorized != Some(version) {
+            *factorized = None;
+            let size = rows.len();
+            let refuse = |row: usize| no_response(record.balance.t, record.held[solved[row]].id);
+            factor.factorize(size, |i, j| w[i * size + j]).map_err(refuse)?;
+            *factorized = Some(version);
+        }
+        factor.solve(x);
+        solved.iter().zip(x).for_each(|(&k, x)| *x /= weights[k]);
+        Ok(())
+    }
+
+    /// Solves for ψ of all rows that carried a force; x becomes Pᵀ ψ.
+    fn solve_with_friction(&mut self, rows: &[usize], weights: &[T], x: &mut [T]) -> Result<()> {
+        let Self { operator, record, back, versions, .. } = self;
+        let (w, _) = operator.delassus(&record.rows, rows, |_| T::zero(), versions)?;
+        let (size, held) = (rows.len(), &record.held);
+        let rules: Vec<Rule<T>> = held.iter().map(|held| held.rule).collect();
+        let entry = |i: usize, j: usize| weights[i] * w[i * size + j];
+        let compliance = |k: usize| held[k].compliance.map_or(T::zero(), |known| known.by_force);
+        back.factorized = None;
+        let refuse = |row: usize| no_response(record.balance.t, held[row].id);
+        solve_transposed(&mut back.factor, &rules, (entry, compliance), x).map_err(refuse)?;
+        back.add_friction(&rules, |k| (held[k].id, x[k]), |k| held[k].force);
+        let open = rules.iter().zip(x).filter(|(rule, _)| **rule != Rule::Closed);
+        open.for_each(|(_, x)| *x = T::zero());
+        Ok(())
     }
 
     /// τ of a row.
     fn weight(&self, held: &Held<T>) -> T {
         let Self { stage, .. } = self;
         match (&stage.contact, held.compliance) {
+            _ if held.is_slip => slip_source(stage, false).1,
             (_, Some(compliance)) => {
                 let [by_u, by_v, _] = stage.balanced().weights();
                 by_u + compliance.lag * by_v
@@ -110,51 +185,5 @@ impl<T: Real> StageBack<'_, '_, T> {
             (Some(contact), None) => contact.row.weight,
             (None, None) => stage.recovery.weights()[0],
         }
-    }
-
-    /// Factorizes W + c/τ of some rows, unless that was the last one factorized.
-    fn factorize(&mut self, g: &ContactJacobian<T>, rows: &[usize], compliance: impl Fn(usize) -> T) -> Result<()> {
-        let Self { operator, back: Back { factor, factorized, .. }, versions, record, .. } = self;
-        let (w, version) = operator.delassus(g, rows, compliance, versions)?;
-        if *factorized == Some(version) {
-            return Ok(());
-        }
-        *factorized = None;
-        let size = rows.len();
-        let t = record.balance.t;
-        let refuse = |row: usize| no_response(t, record.held[row].id);
-        factor.factorize(size, |i, j| w[i * size + j]).map_err(refuse)?;
-        *factorized = Some(version);
-        Ok(())
-    }
-
-    /// d̄ becomes w; returns q/τ, the derivatives by δs.
-    fn solve(&mut self, read: &[T], d: &mut [T]) -> Result<Vec<T>> {
-        let StageRecord { rows: g, held, .. } = self.record;
-        let mut q = vec![T::zero(); held.len()];
-        let solved: Vec<usize> = (0..held.len()).filter(|&k| self.weight(&held[k]) != T::zero()).collect();
-        let rows: Vec<usize> = solved.iter().map(|&k| held[k].row).collect();
-        let size = self.operator.interface();
-        let [mut interface, mut response, mut forces] = [0; 3].map(|_| vec![T::zero(); size]);
-        self.operator.begin(d, &mut interface)?;
-        if !rows.is_empty() {
-            let mut multipliers: Vec<T> =
-                solved.iter().map(|&k| read[k] + g.interface_product(held[k].row, &interface)).collect();
-            let compliances: Vec<T> = solved.iter().map(|&k| self.compliance(&held[k])).collect();
-            self.factorize(g, &rows, |k| compliances[k])?;
-            self.back.factor.solve(&mut multipliers);
-            self.operator.answer(g, (&rows, &multipliers), &mut forces, &mut response);
-            T::axpy(-T::one(), &response, &mut interface);
-            forces.iter_mut().for_each(|force| *force = -*force);
-            for (&k, &multiplier) in solved.iter().zip(&multipliers) {
-                q[k] = multiplier / self.weight(&held[k]);
-            }
-        }
-        self.operator.finish(d, &interface, &forces)?;
-        // A force that depends on known displacements alone: c δλ = δs.
-        for (k, held) in held.iter().enumerate().filter(|(_, held)| self.weight(held) == T::zero()) {
-            q[k] = held.compliance.map_or(T::zero(), |known| (read[k] + g.product(held.row, d)) / known.by_force);
-        }
-        Ok(q)
     }
 }

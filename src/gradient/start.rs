@@ -5,7 +5,7 @@ use super::backward::{Back, Seeds};
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::Simulation;
-use crate::state::{Motion, StartingPast, Tape};
+use crate::state::{Motion, Rule, StartingPast, Tape};
 
 /// From the derivatives by the stored states at the start, newest first, and by what the objective reads there, to
 /// those by the initial displacements and velocities.
@@ -40,19 +40,32 @@ pub(super) fn start_back<T: Real>(
     // M a = f + Gᵀ λ with G a + γ = 0 on the contacts that press.
     let Simulation { parts, g, .. } = run;
     let contacts = &tape.start.contacts;
-    let rows: Vec<usize> = (0..contacts.ids.len()).filter(|&row| contacts.lambda[row] != T::zero()).collect();
+    let (mut rows, mut rules) = (Vec::new(), Vec::new());
+    for row in (0..contacts.ids.len()).filter(|&row| contacts.lambda[row] != T::zero()) {
+        let (normal, force) = (rows.len(), contacts.lambda[row]);
+        let bound = T::of(contacts.tangents.friction(row)) * force;
+        rows.push(row);
+        rules.push(Rule::Closed);
+        for row in contacts.tangents.of(row) {
+            rows.push(row);
+            rules.push(Rule::of_friction(normal, [force, contacts.lambda[row]], bound));
+        }
+    }
     let mut w = a;
     back.projection.apply_inverse(&mut w)?;
     if !rows.is_empty() {
-        let rows_at_start = tape.steps.first().and_then(|step| step.stages.first()).map(|stage| &stage.rows);
-        let g = rows_at_start.map_or(&*g, |rows| &**rows);
-        if let Some(rows) = rows_at_start {
+        let recorded = tape.steps.first().and_then(|step| step.stages.first()).map(|stage| &stage.rows);
+        let g = recorded.map_or(&*g, |rows| &**rows);
+        if let Some(rows) = recorded {
             back.follow(rows);
         }
-        back.projection.close(g, &rows)?;
-        let mut sigma: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + force[row]).collect();
-        back.projection.solve(&mut sigma);
-        back.projection.push(g, (&rows, &sigma), -T::one(), &mut w)?;
+        let mut psi: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + force[row]).collect();
+        back.solve_jumps((g, &rows), &rules, &mut psi, contacts)?;
+        let name = |k: usize| contacts.ids[contacts.tangents.owner(rows[k])];
+        back.add_friction(&rules, |k| (name(k), psi[k]), |k| contacts.lambda[rows[k]]);
+        let open = rules.iter().zip(&mut psi).filter(|(rule, _)| **rule != Rule::Closed);
+        open.for_each(|(_, psi)| *psi = T::zero());
+        back.projection.push(g, (&rows, &psi), -T::one(), &mut w)?;
     }
     let (system, start) = (&mut *parts.system, &tape.start);
     let (t, displacement) = (start.time(), start.displacement());

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Simulation;
-use crate::state::StartingPast;
+use crate::state::{SLIDES_IN_SPACE, StartingPast, TURNS, slides};
 use crate::system::Linearity;
 
 /// Refuses a run that has a part without derivative. Returns which past it starts from.
@@ -24,9 +24,6 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
             return refuse(format!("the corrector {}", corrector.name()), "choose `PersistencyCorrection`");
         }
     }
-    if !run.constraints.tangents().is_empty() {
-        return refuse("friction".into(), "the derivative of sliding friction is not implemented");
-    }
     if !run.constraints.is_affine() {
         let reason =
             "the derivative of rows that turn is not implemented: choose obstacles and gaps that are linear in u";
@@ -43,6 +40,16 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
     }
     if !compiled.program.operators.iter().all(|operator| operator.is_symmetric()) {
         return refuse("an unsymmetric or iterative linear solver".into(), "choose `Automatic`");
+    }
+    let tangents = run.constraints.tangents();
+    let slides_in_space = |row: usize| {
+        let bound = T::of(tangents.friction(row)) * state.contacts.lambda[row];
+        tangents.of(row).len() > 1
+            && bound > T::zero()
+            && slides(state.contacts.tangential(row, &state.contacts.lambda), bound)
+    };
+    if tangents.contacts().any(slides_in_space) {
+        return refuse(SLIDES_IN_SPACE.into(), TURNS);
     }
     let compliant = |row: usize| state.contacts.lambda[row] != T::zero() && run.constraints.laws()[row].is_compliant();
     if (0..run.constraints.len()).any(compliant) {

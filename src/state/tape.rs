@@ -3,6 +3,7 @@
 use super::{Motion, State};
 use crate::contact::{ContactId, ContactJacobian, ContactLaw};
 use crate::real::Real;
+use crate::rounding::half_digits;
 use std::sync::Arc;
 
 /// The records of the steps since the start of a run.
@@ -29,6 +30,10 @@ pub(crate) enum StartingPast {
     /// Taylor's expansion.
     Expanded,
 }
+
+/// Why friction that slides along two tangents is refused.
+pub(crate) const SLIDES_IN_SPACE: &str = "friction that slides in space";
+pub(crate) const TURNS: &str = "its direction turns, and the derivative of that is not implemented";
 
 /// Something that happened in a run and has no derivative.
 #[derive(Clone, Debug)]
@@ -64,11 +69,45 @@ pub(crate) struct StageRecord<T> {
     pub(crate) changes: Vec<Change<T>>,
 }
 
-/// A row that carried a force.
+/// What a row obeys.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Rule<T> {
+    /// Its gap, slip or jump is zero, or that of its law.
+    Closed,
+    /// It has no multiplier.
+    Unloaded,
+    /// Its multiplier is `share` times that of the row at the place `normal` of the list.
+    Slides { normal: usize, share: T },
+}
+
+impl<T: Real> Rule<T> {
+    /// The rule of a tangential row of a contact, in a problem in which it may stick, by the multipliers of both.
+    /// `bound` is the largest friction.
+    pub(crate) fn of_friction(normal: usize, [force, friction]: [T; 2], bound: T) -> Self {
+        if bound <= T::zero() {
+            Self::Unloaded
+        } else if slides(friction.abs(), bound) {
+            Self::Slides { normal, share: friction / force }
+        } else {
+            Self::Closed
+        }
+    }
+}
+
+/// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
+pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
+    friction >= (T::one() - half_digits::<T>()) * bound.max(T::zero())
+}
+
+/// A row that carried a force. Tangential rows follow the row of their contact.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held<T> {
     pub(crate) row: usize,
     pub(crate) id: ContactId,
+    pub(crate) rule: Rule<T>,
+    pub(crate) force: T,
+    /// Whether it is tangential.
+    pub(crate) is_slip: bool,
     /// If its law is compliant.
     pub(crate) compliance: Option<Compliance<T>>,
 }
@@ -81,10 +120,10 @@ pub(crate) struct Compliance<T> {
     pub(crate) law: ContactLaw,
     pub(crate) gap: T,
     pub(crate) rate: T,
-    pub(crate) force: T,
 }
 
-/// A change along rows, x ← x + M⁻¹ Gᵀ m, after which these rows have no jump.
+/// A change along rows, x ← x + M⁻¹ Gᵀ m, with which the rows obey rules: their jump vanishes, or their total
+/// multiplier, m and `share` times the raw one.
 #[derive(Clone, Debug)]
 pub(crate) struct Change<T> {
     /// 0 for the state of the stage, k for past state k.
@@ -92,8 +131,11 @@ pub(crate) struct Change<T> {
     /// 0, 1, 2: u, v, a.
     pub(crate) field: usize,
     pub(crate) rows: Vec<usize>,
-    /// m.
+    pub(crate) rules: Vec<Rule<T>>,
+    /// m, and the total multipliers.
     pub(crate) multipliers: Vec<T>,
+    pub(crate) totals: Vec<T>,
+    pub(crate) share: T,
     /// Reported force and impulse per unit of m.
     pub(crate) force: T,
     pub(crate) impulse: T,
@@ -105,6 +147,8 @@ pub(crate) struct Change<T> {
 #[derive(Debug, Default)]
 pub(crate) struct Changes<T> {
     pub(crate) list: Vec<Change<T>>,
+    /// The jumps of v and a that are solved, and not removed yet.
+    pub(crate) solved: [Option<Change<T>>; 2],
     pub(crate) refusal: Option<Refusal>,
 }
 

@@ -11,6 +11,8 @@ pub struct GradientError {
     pub relative: f64,
     /// The parameter with this error.
     pub parameter: usize,
+    /// The derivatives given, one a parameter.
+    pub given: Vec<f64>,
     /// The derivatives by differences, one a parameter: by the quotients of both step sizes, extrapolated.
     pub expected: Vec<f64>,
     /// The relative difference between the quotients of both step sizes, one a parameter. Where contacts close or open
@@ -57,7 +59,8 @@ pub fn gradient(
         return Err(Error::Parameter { name: "the step of a parameter", value: step, range: "positive and finite" });
     }
     let mut at = parameters.to_vec();
-    let mut error = GradientError { relative: 0.0, parameter: 0, expected: Vec::new(), spread: Vec::new() };
+    let given = gradient.to_vec();
+    let mut error = GradientError { relative: 0.0, parameter: 0, given, expected: Vec::new(), spread: Vec::new() };
     for (number, (&given, &step)) in gradient.iter().zip(steps).enumerate() {
         let mut quotient = |step: f64| {
             let mut ends = [0.0; 2];

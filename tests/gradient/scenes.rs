@@ -40,10 +40,10 @@ fn a_block_on_a_plane() {
             let solid = block(at);
             Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
                 .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
-                .constraint(contact(&solid, at[6])?)
+                .constraint(contact(&solid, at[7])?)
                 .build()
         };
-        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
+        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
         assert_equal(&error, &schemes()[number].name());
     }
 }
@@ -60,11 +60,11 @@ fn a_soft_block_on_a_plane() {
                 system.particles.weigh([0.0, -3.0 * at[3] / at[0]]);
                 Simulation::builder(system, schemes().swap_remove(number), 0.003)
                     .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
-                    .constraint(contact(&solid, at[6])?)
+                    .constraint(contact(&solid, at[7])?)
                     .newton(contact_dynamics::Newton::full().tolerances(1e-12, 1e-12)?)
                     .build()
             };
-            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
+            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
             assert_equal(&error, &format!("{law:?}, {}", schemes()[number].name()));
         }
     }
@@ -84,9 +84,9 @@ fn driven(
     let factor = at[3];
     let system = system.load(move |t, f| f[1] = factor * (3.0 * t).cos());
     let stops = LinearRows::new()
-        .unilateral(&[(1, 1.0)], 0.3 + at[6])
-        .unilateral(&[(1, 1.0)], 0.3 + at[6])
-        .unilateral(&[(1, -1.0)], 0.31 + at[6]);
+        .unilateral(&[(1, 1.0)], 0.3 + at[7])
+        .unilateral(&[(1, 1.0)], 0.3 + at[7])
+        .unilateral(&[(1, -1.0)], 0.31 + at[7]);
     let mut builder = Simulation::builder(system, scheme, 0.013).velocity(vec![0.0, at[4]]).constraint(stops);
     if let Some(control) = control {
         builder = builder.step_control(control);
@@ -98,7 +98,7 @@ fn driven(
 fn a_driven_mass_between_stops() {
     for number in 0..schemes().len() {
         let build = |at: &[f64]| driven(at, schemes().swap_remove(number), None);
-        let error = compare(&build, &|run| run.run_until(1.2, &mut ()).map(drop), (7, 0.1)).unwrap();
+        let error = compare(&build, &|run| run.run_until(1.2, &mut ()).map(drop), (8, 0.1)).unwrap();
         assert_equal(&error, &schemes()[number].name());
     }
 }
@@ -114,9 +114,52 @@ fn steps_that_change() {
         }
         run.land_on(1.5, &mut ()).map(drop)
     };
-    assert_equal(&compare(&build, &advance, (7, 0.1)).unwrap(), "changed by the host");
+    assert_equal(&compare(&build, &advance, (8, 0.1)).unwrap(), "changed by the host");
     let control = StepControl::halving(0.013 / 16.0).unwrap().contact_changes(1).unwrap();
     let build = |at: &[f64]| driven(at, Box::new(Newmark::trapezoidal()), Some(control));
-    let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (7, 0.1)).unwrap();
+    let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
     assert_equal(&error, "changed by the control");
+}
+
+/// A block lands obliquely on a floor and slides, or sticks.
+#[test]
+fn a_block_that_slides_and_sticks() {
+    for number in 0..schemes().len() {
+        for friction in [0.1, 0.6] {
+            let build = |at: &[f64]| {
+                let solid = block(at);
+                Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
+                    .velocity(solid.uniform([0.31 * at[4], -1.0 * at[4]]))
+                    .constraint(contact(&solid, at[7])?.friction(friction + at[6]))
+                    .build()
+            };
+            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
+            assert_equal(&error, &format!("μ = {friction}, {}", schemes()[number].name()));
+        }
+    }
+}
+
+/// A mass on a spring is set down, slides to and fro, and stops; one that lies on the floor is pulled from rest.
+#[test]
+fn a_mass_that_slides() {
+    for number in 0..schemes().len() {
+        for [height, speed, pull] in [[0.0133, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 4.0]] {
+            let build = |at: &[f64]| {
+                let spring = [Triplet::new(0, 0, 10.0 * at[2]), Triplet::new(1, 1, 0.0)];
+                let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &spring).unwrap();
+                let factor = at[3];
+                let system = LinearSystem::lumped(vec![2.0 * at[0]; 2], stiffness)?;
+                let system = system.load(move |t, f| [f[0], f[1]] = [factor * pull * (0.5 + t), -5.0 * factor]);
+                let floor = LinearRows::new().unilateral(&[(1, 1.0)], height + at[7]);
+                Simulation::builder(system, schemes().swap_remove(number), 0.01)
+                    .velocity(vec![speed * at[4], if height > 0.0 { -0.5 * at[4] } else { 0.0 }])
+                    .constraint(floor.friction(0.3 + at[6], &[&[(0, 1.0)]]))
+                    .build()
+            };
+            // The height of a contact that is closed at the start does not change.
+            let varied = if height > 0.0 { 8 } else { 7 };
+            let error = compare(&build, &|run| run.run_until(0.4, &mut ()).map(drop), (varied, 0.1)).unwrap();
+            assert_equal(&error, &format!("{height}, {speed}, {pull}: {}", schemes()[number].name()));
+        }
+    }
 }

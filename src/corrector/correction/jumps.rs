@@ -51,6 +51,7 @@ impl<T: Real> Correction<'_, T> {
         // The acceleration problem needs the directions of friction.
         problem.keep_directions();
         impulses.store(problem);
+        self.record_solution(1, share);
         Ok(())
     }
 
@@ -68,6 +69,7 @@ impl<T: Real> Correction<'_, T> {
         result?;
         let Buffers { forces, problem, .. } = &mut *self.buffers;
         forces.store(problem);
+        self.record_solution(2, share);
         Ok(())
     }
 
@@ -170,7 +172,7 @@ impl<T: Real> Correction<'_, T> {
     /// As [`apply_impulses`](Self::apply_impulses).
     pub fn push_velocity(&mut self) -> Result<()> {
         let impulses = std::mem::take(&mut self.buffers.impulses);
-        self.record_removal(1, &impulses);
+        self.record_removal(1);
         let mut result = self.apply(&impulses.rows, &impulses.multipliers);
         for (&row, &impulse) in impulses.rows.iter().zip(&impulses.multipliers) {
             if impulse != T::zero() {
@@ -200,7 +202,7 @@ impl<T: Real> Correction<'_, T> {
         let mut forces = std::mem::take(&mut self.buffers.forces);
         let given = T::of(self.scheme.acceleration / self.scheme.balance);
         let result = self.limit_forces(&forces.rows, &mut forces.multipliers, given);
-        self.record_removal(2, &forces);
+        self.record_removal(2);
         let result = result.and_then(|()| self.push_forces(&forces.rows, &forces.multipliers));
         self.buffers.forces = forces;
         result
@@ -210,12 +212,9 @@ impl<T: Real> Correction<'_, T> {
 impl<T: Real> Removal<T> {
     /// Stores the increments of a solved problem.
     fn store(&mut self, problem: &JumpProblem<T>) {
-        let JumpProblem { blocks, rows, owners, totals, increments, .. } = problem;
+        let JumpProblem { blocks, rows, increments, .. } = problem;
         self.rows.clone_from(rows);
         self.multipliers.clone_from(increments);
-        self.held.clear();
-        let held = |(&owner, &total): (&usize, &T)| blocks[owner].set.is_bilateral() || total != T::zero();
-        self.held.extend(owners.iter().zip(totals).map(held));
         self.normal.clear();
         self.normal.extend(blocks.iter().map(|block| increments[block.place]));
     }

@@ -1,35 +1,85 @@
 //! The changes of a stage on the tape of a recorded run.
 
 use super::Correction;
-use crate::corrector::buffers::Removal;
+use crate::corrector::JumpProblem;
 use crate::real::Real;
-use crate::state::Change;
+use crate::state::{Change, Rule, SLIDES_IN_SPACE, TURNS, slides};
 
 impl<T: Real> Correction<'_, T> {
-    /// Records that the jumps of field 1 or 2 (v or a) of the state are removed.
-    pub(super) fn record_removal(&mut self, field: usize, removal: &Removal<T>) {
-        let Self { buffers, scheme, .. } = self;
-        let damps = field == 1 && buffers.spreads();
-        let Some(changes) = &mut buffers.changes else { return };
-        let held = || removal.held.iter().zip(&removal.rows).zip(&removal.multipliers).filter(|((held, _), _)| **held);
-        changes.list.push(Change {
-            state: 0,
-            field,
-            rows: held().map(|((_, &row), _)| row).collect(),
-            multipliers: held().map(|(_, &multiplier)| multiplier).collect(),
-            force: if field == 2 { T::of(scheme.balance / scheme.acceleration) } else { T::zero() },
-            impulse: T::of(scheme.covector[0][field] * if field == 2 { scheme.h } else { 1.0 }),
-            damps,
-        });
+    /// Records the solved jumps of field 1 or 2 (v or a); raw multipliers contribute `share` to the totals.
+    pub(super) fn record_solution(&mut self, field: usize, share: T) {
+        if self.buffers.changes.is_none() {
+            return;
+        }
+        let change = Change {
+            force: if field == 2 { T::of(self.scheme.balance / self.scheme.acceleration) } else { T::zero() },
+            impulse: T::of(self.scheme.covector[0][field] * if field == 2 { self.scheme.h } else { 1.0 }),
+            damps: field == 1 && self.buffers.spreads(),
+            share,
+            ..self.solution(0, field)
+        };
+        if let Some(changes) = &mut self.buffers.changes {
+            changes.solved[field - 1] = Some(change);
+        }
+    }
+
+    /// Records that the solved jumps of field 1 or 2 are removed.
+    pub(super) fn record_removal(&mut self, field: usize) {
+        if let Some(changes) = &mut self.buffers.changes {
+            let solved = changes.solved[field - 1].take();
+            changes.list.extend(solved);
+        }
     }
 
     /// Records that a field of past state k is projected, with the impulse of a unit multiplier.
     pub(super) fn record_past(&mut self, k: usize, field: usize, impulse: T) {
-        let problem = &self.buffers.problem;
-        let (rows, multipliers) = (&problem.rows, &problem.increments);
-        let Some(changes) = &mut self.buffers.changes else { return };
-        let (rows, multipliers) = (rows.clone(), multipliers.clone());
-        changes.list.push(Change { state: k, field, rows, multipliers, force: T::zero(), impulse, damps: false });
+        if self.buffers.changes.is_some() {
+            let change = Change { impulse, ..self.solution(k, field) };
+            self.buffers.changes.iter_mut().for_each(|changes| changes.list.push(change.clone()));
+        }
+    }
+
+    /// The solution of the present problem, for a field of a state, without what is reported of it.
+    fn solution(&mut self, state: usize, field: usize) -> Change<T> {
+        let Self { buffers, constraints, .. } = self;
+        let JumpProblem { blocks, rows, totals, increments, .. } = &*buffers.problem;
+        let mut change = Change {
+            state,
+            field,
+            rows: Vec::new(),
+            rules: Vec::new(),
+            multipliers: Vec::new(),
+            totals: Vec::new(),
+            share: T::zero(),
+            force: T::zero(),
+            impulse: T::zero(),
+            damps: false,
+        };
+        for block in blocks {
+            let (normal, total) = (change.rows.len(), totals[block.place]);
+            let closes = block.set.is_bilateral() || total != T::zero();
+            // A touching contact without friction that separates has no multiplier before and after.
+            if !closes && block.tangents == 0 {
+                continue;
+            }
+            let friction = T::of(constraints.0.tangents().friction(block.row));
+            let tangential = totals[block.places()].iter().skip(1).fold(T::zero(), |size, &f| size.hypot(f));
+            if block.tangents > 1 && tangential > T::zero() && slides(tangential, friction * total) {
+                buffers.changes.iter_mut().for_each(|changes| changes.refuse(SLIDES_IN_SPACE, TURNS));
+            }
+            for place in block.places() {
+                change.rules.push(match (place == block.place, block.direction) {
+                    (true, _) if closes => Rule::Closed,
+                    (true, _) => Rule::Unloaded,
+                    (false, Some([along, _])) => Rule::Slides { normal, share: along },
+                    (false, None) => Rule::of_friction(normal, [total, totals[place]], friction * total),
+                });
+                change.rows.push(rows[place]);
+                change.multipliers.push(increments[place]);
+                change.totals.push(totals[place]);
+            }
+        }
+        change
     }
 
     /// Records that this run has no gradient.

@@ -19,7 +19,7 @@ use crate::state::{Clock, Motion};
 
 /// The source of the slip of a stage.
 #[derive(Clone, Copy, Debug)]
-enum Source<T> {
+pub(crate) enum Source<T> {
     /// The velocity of the state, times this factor.
     Velocity(T),
     /// The target of contact: h times a velocity.
@@ -31,7 +31,7 @@ enum Source<T> {
 }
 
 /// The source of a slip, and the weight of d in it.
-fn source<T: Real>(stage: &CompiledStage<T>, by_displacement: bool) -> (Source<T>, T) {
+pub(crate) fn source<T: Real>(stage: &CompiledStage<T>, by_displacement: bool) -> (Source<T>, T) {
     let [by_u, by_v, _] = stage.recovery.weights();
     match &stage.contact {
         Some(target) if target.forecast.is_some() => (Source::Target, target.row.weight),

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::half_digits;
 use crate::simulation::stage::StageSolve;
-use crate::state::{Compliance, Held, Motion, StageRecord, Tape};
+use crate::state::{Compliance, Held, Motion, Rule, SLIDES_IN_SPACE, StageRecord, TURNS, Tape, slides};
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Records the solution d of the stage, before corrections. `impulse` is the impulse of a unit multiplier.
@@ -36,7 +36,18 @@ impl<T: Real> StageSolve<'_, '_, T> {
                     continue;
                 }
             };
-            held.push(Held { row, id: self.constraints.ids[row], compliance });
+            let id = self.constraints.ids[row];
+            let (normal, rule) = (held.len(), Rule::Closed);
+            held.push(Held { row, id, rule, force, is_slip: false, compliance });
+            let (tangents, raw) = (self.constraints.tangents(), &self.contact.trial.lambda_raw);
+            let bound = T::of(tangents.friction(row)) * force;
+            if tangents.of(row).len() > 1 && slides(self.contact.trial.tangential(row, raw), bound) {
+                tape.refuse(SLIDES_IN_SPACE, TURNS);
+            }
+            for row in tangents.of(row) {
+                let rule = Rule::of_friction(normal, [force, raw[row]], bound);
+                held.push(Held { row, id, rule, force: raw[row], is_slip: true, compliance: None });
+            }
         }
         let rows = tape.rows(self.g, self.constraints.version());
         tape.stages.push(StageRecord { balance, rows, held, impulse, changes: Vec::new() });
@@ -73,7 +84,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
 
 /// A compliant law linearized at the force of a row with this gap and rate.
 fn compliance<T: Real>(law: ContactLaw, [gap, rate]: [T; 2], force: T) -> Compliance<T> {
-    let known = Compliance { by_force: T::zero(), lag: T::zero(), law, gap, rate, force };
+    let known = Compliance { by_force: T::zero(), lag: T::zero(), law, gap, rate };
     // A dashpot that begins to press bears a part of its force at a gap of zero: it is rigid then.
     if (law.force(gap, -rate) - force).abs() > half_digits::<T>() * force {
         return known;
