@@ -4,7 +4,8 @@
 //! - [`parameters`](Parameters): what the host wants derivatives by.
 //! - `support`: which runs are recorded; [`Simulation::record`] begins, [`Simulation::gradient`] goes back.
 //! - `backward`: from the last step to the first; `stage`: the transpose of a stage, `changes`: of its corrections,
-//!   `start`: of the state at the start; `conditions`: of contact conditions, `products`: products with K and C.
+//!   `start`: of the state at the start; `conditions`: of contact conditions, `products`: products with K and C,
+//!   `replay`: steps taken again from checkpoints.
 
 mod backward;
 mod changes;
@@ -12,6 +13,7 @@ mod conditions;
 mod objective;
 mod parameters;
 mod products;
+mod replay;
 mod stage;
 mod start;
 mod support;
@@ -23,7 +25,7 @@ use crate::contact::ContactId;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Simulation;
-use crate::state::Tape;
+use crate::state::{Checkpoints, Tape};
 
 /// The derivatives of an objective J by initial values and gaps; see [`Simulation::gradient`].
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +70,22 @@ impl<T: Real> Simulation<'_, T> {
         let past = support::check(self)?;
         self.work.tape = Some(Box::new(Tape::new(self.state.clone(), past)));
         self.work.correction.buffers.changes = Some(Box::default());
+        Ok(())
+    }
+
+    /// [`record`](Self::record) with less memory: of N steps some √N states are kept, and [`gradient`](Self::gradient)
+    /// takes the steps between them again, some √N at a time. It takes the time of another run.
+    ///
+    /// The steps taken again call [`System::commit`](crate::System::commit) again.
+    ///
+    /// # Errors
+    ///
+    /// As [`record`](Self::record). [`gradient`](Self::gradient) refuses runs in which bonds have broken.
+    pub fn record_checkpoints(&mut self) -> Result<()> {
+        self.record()?;
+        if let Some(tape) = &mut self.work.tape {
+            tape.checkpoints = Some(Checkpoints::new(self.state.clone(), self.history.clone()));
+        }
         Ok(())
     }
 
@@ -119,10 +137,16 @@ impl<T: Real> Simulation<'_, T> {
                 let reason = "the run is not recorded: call `record` before the first step";
                 return Err(Error::Incompatible { part: "the gradient".into(), reason });
             };
+            if tape.checkpoints.is_some() && !run.state.broken.is_empty() {
+                run.work.tape = Some(tape);
+                let reason = "steps are not taken again before a bond has broken: call `record`";
+                return Err(Error::Incompatible { part: "the gradient by checkpoints".into(), reason });
+            }
             let h = run.history.clock.h;
             let result = backward::run_backward(run, &tape, objective, parameters);
             run.work.tape = Some(tape);
             let restored = run.compile_for(h);
+            run.search_again();
             let gradient = result?;
             restored?;
             Ok(gradient)

@@ -21,6 +21,7 @@ pub(crate) use rows::slip::{Source as SlipSource, source as slip_source};
 pub(crate) use run::Parts;
 pub use run::Simulation;
 pub use run::contact_output::ContactForce;
+pub(crate) use run::impulses::Impulses;
 pub use run::results::{Energy, Outcome, Statistics, Works};
 pub(crate) use stage::massless::MasslessBlock;
 pub use stage::newton::{Iteration, Newton};

@@ -3,14 +3,14 @@
 use super::changes::ChangesBack;
 use super::products::Tangents;
 use super::stage::StageBack;
-use super::{Gradient, Objective, Parameters, RecordedStep, Seed, start};
+use super::{Gradient, Objective, Parameters, RecordedStep, Seed, replay, start};
 use crate::contact::{ContactId, ContactJacobian};
 use crate::corrector::JumpProjection;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::{At, Parts, Program, Simulation, projection};
-use crate::state::{Motion, State, StepRecord, Tape};
+use crate::state::{Checkpoints, Motion, State, StepRecord, Tape};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -69,10 +69,7 @@ pub(super) fn run_backward<T: Real>(
     objective: &mut dyn Objective<T>,
     parameters: &mut dyn Parameters<T>,
 ) -> Result<Gradient<T>> {
-    if let Some(refusal) = &tape.refusal {
-        let part = format!("the gradient through {}", refusal.what);
-        return Err(Error::Incompatible { part, reason: refusal.reason });
-    }
+    refuse(tape)?;
     let dofs = run.parts.system.dofs();
     let Parts { system, linear_solver, together, .. } = &run.parts;
     let mut back = Back {
@@ -87,49 +84,71 @@ pub(super) fn run_backward<T: Real>(
         factor: DenseCholesky::default(),
         factorized: None,
     };
-    let mut starter = None;
     // The derivatives by the newest state, and by the states before it.
-    let depth = run.scheme.slots();
-    let mut states: Vec<Motion<T>> = (0..=depth).map(|_| Motion::zero(dofs)).collect();
-    let mut value = T::zero();
-    let mut at = Place { steps: tape.steps.len(), h: run.history.clock.h };
-    for (number, step) in tape.steps.iter().enumerate().rev() {
-        let seeds = at.seed((number + 1, step.h), &step.state, objective, (&mut states[0], &mut value));
-        let [shares, past] = rate_shares(&run.scheme.shifts, step.extrapolates);
-        for field in 0..2 {
-            T::axpy(shares[field], &seeds.rates[field], states[0].field_mut(field + 1));
-            T::axpy(past[field], &seeds.rates[field], states[1].field_mut(field + 1));
+    let states = (0..=run.scheme.slots()).map(|_| Motion::zero(dofs)).collect();
+    let mut way = Way { objective, value: T::zero(), steps: tape.len(), states, starter: None };
+    match &tape.checkpoints {
+        None => way.steps_back(run, &mut back, (&tape.steps, 0))?,
+        Some(Checkpoints { list, every, sizes }) => {
+            for (number, from) in list.iter().enumerate().rev() {
+                let first = number * every;
+                let sizes = &sizes[first..sizes.len().min(first + every)];
+                let segment = replay::take_again(run, tape, from, sizes)?;
+                way.steps_back(run, &mut back, (&segment.steps, first))?;
+            }
         }
-        step_back((run, &mut starter), &mut back, step, &seeds, &mut states)?;
     }
-    let h = tape.steps.first().map_or(at.h, |step| step.h);
-    let seeds = at.seed((0, h), &tape.start, objective, (&mut states[0], &mut value));
-    let [displacement, velocity] = start::start_back((run, tape, h), &mut back, seeds, states)?;
+    let h = match &tape.checkpoints {
+        None => tape.steps.first().map(|step| step.h),
+        Some(checkpoints) => checkpoints.sizes.first().copied(),
+    };
+    let h = h.unwrap_or(run.history.clock.h);
+    let seeds = way.seed((0, h), &tape.start);
+    let [displacement, velocity] = start::start_back((run, tape, h), &mut back, seeds, way.states)?;
     let [gaps, friction] = [back.gaps, back.friction].map(|map| map.into_iter().collect());
-    Ok(Gradient { value, displacement, velocity, gaps, friction })
+    Ok(Gradient { value: way.value, displacement, velocity, gaps, friction })
 }
 
-/// Shares of the stored v and a in those at the time of the state, and of the state before.
-fn rate_shares<T: Real>(shifts: &[f64; 2], extrapolates: bool) -> [[T; 2]; 2] {
-    let shifts = if extrapolates { *shifts } else { [0.0; 2] };
-    [shifts.map(|shift| T::of(1.0 - shift)), shifts.map(T::of)]
+/// Refuses a run in which something happened that has no derivative.
+pub(super) fn refuse<T: Real>(tape: &Tape<T>) -> Result<()> {
+    let Some(refusal) = &tape.refusal else { return Ok(()) };
+    let part = format!("the gradient through {}", refusal.what);
+    Err(Error::Incompatible { part, reason: refusal.reason })
 }
 
-/// How far a run back has come.
-struct Place {
+/// The way back.
+struct Way<'w, T: Real> {
+    objective: &'w mut dyn Objective<T>,
+    value: T,
     steps: usize,
-    h: f64,
+    states: Vec<Motion<T>>,
+    /// The scheme of the first steps.
+    starter: Option<Program<T>>,
 }
 
-impl Place {
-    /// Asks the objective for its term of a state.
-    fn seed<T: Real>(
+impl<T: Real> Way<'_, T> {
+    /// Goes back through some steps, the first of which has the number `first` + 1.
+    fn steps_back(
         &mut self,
-        (step, h): (usize, f64),
-        state: &State<T>,
-        objective: &mut dyn Objective<T>,
-        (motion, value): (&mut Motion<T>, &mut T),
-    ) -> Seeds<T> {
+        run: &mut Simulation<'_, T>,
+        back: &mut Back<'_, T>,
+        (steps, first): (&[StepRecord<T>], usize),
+    ) -> Result<()> {
+        for (place, step) in steps.iter().enumerate().rev() {
+            let seeds = self.seed((first + place + 1, step.h), &step.state);
+            let [shares, past] = rate_shares(&run.scheme.shifts, step.extrapolates);
+            for field in 0..2 {
+                T::axpy(shares[field], &seeds.rates[field], self.states[0].field_mut(field + 1));
+                T::axpy(past[field], &seeds.rates[field], self.states[1].field_mut(field + 1));
+            }
+            step_back((run, &mut self.starter), back, step, &seeds, &mut self.states)?;
+        }
+        Ok(())
+    }
+
+    /// Asks the objective for its term of a state.
+    fn seed(&mut self, (step, h): (usize, f64), state: &State<T>) -> Seeds<T> {
+        let motion = &mut self.states[0];
         let (dofs, rows) = (motion.u.len(), state.contacts.lambda.len());
         let zero = |entries: usize| vec![T::zero(); entries];
         let mut seeds = Seeds { rates: [zero(dofs), zero(dofs)], force: zero(rows), impulse: zero(rows) };
@@ -141,9 +160,15 @@ impl Place {
             force: &mut seeds.force,
             impulse: &mut seeds.impulse,
         };
-        *value += objective.term(&RecordedStep { state, h, step, steps: self.steps }, &mut seed);
+        self.value += self.objective.term(&RecordedStep { state, h, step, steps: self.steps }, &mut seed);
         seeds
     }
+}
+
+/// Shares of the stored v and a in those at the time of the state, and of the state before.
+fn rate_shares<T: Real>(shifts: &[f64; 2], extrapolates: bool) -> [[T; 2]; 2] {
+    let shifts = if extrapolates { *shifts } else { [0.0; 2] };
+    [shifts.map(|shift| T::of(1.0 - shift)), shifts.map(T::of)]
 }
 
 /// Goes back through a step. On entry `states` holds the derivatives by the state at its end and by older ones, on

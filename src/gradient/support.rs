@@ -10,7 +10,7 @@ use crate::system::Linearity;
 pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast> {
     let refuse =
         |part: String, reason| Err(Error::Incompatible { part: format!("the gradient through {part}"), reason });
-    if run.history.clock.steps > 0 {
+    if !run.history.clock.is_at_start() {
         return refuse("a run that has begun".into(), "call `record` before its first step");
     }
     if !run.parts.together.is_alone() {

@@ -90,6 +90,11 @@ impl<T: Real> Simulation<'_, T> {
     /// Undoes the changes of an attempt to state, history and rows.
     fn undo(&mut self) {
         self.put_back();
+        self.search_again();
+    }
+
+    /// Finds the rows of the present state again.
+    pub(crate) fn search_again(&mut self) {
         let Self { constraints, g, state, history, scheme, .. } = self;
         // Rows may have followed the failed step: this moves them back to the state. A past that is resampled for
         // half of the step is projected onto gaps as the step has measured them. An error of this search is not lost,

@@ -38,6 +38,11 @@ impl Clock {
         Self { elapsed: self.elapsed_at(0.0), steps: 0, h, ..*self }
     }
 
+    /// Whether no time has passed since the start.
+    pub(crate) fn is_at_start(&self) -> bool {
+        self.elapsed_at(0.0) == 0.0
+    }
+
     /// Duration from now until t.
     pub(crate) fn until(&self, t: f64) -> f64 {
         (t - self.origin) - self.elapsed_at(0.0)

@@ -1,6 +1,6 @@
 //! The tape of a run: what each stage leaves for the gradient. Empty boxes in runs that are not recorded.
 
-use super::{Motion, State};
+use super::{History, Motion, State};
 use crate::contact::{ContactId, ContactJacobian, ContactLaw};
 use crate::real::Real;
 use crate::rounding::half_digits;
@@ -13,11 +13,46 @@ pub(crate) struct Tape<T> {
     /// The past at the start that the first step reads.
     pub(crate) past: StartingPast,
     pub(crate) steps: Vec<StepRecord<T>>,
+    /// Only these instead of the steps, if memory is to be saved.
+    pub(crate) checkpoints: Option<Checkpoints<T>>,
     /// The stages of the step that is being tried.
     pub(crate) stages: Vec<StageRecord<T>>,
     /// The rows recorded last, and their version.
     rows: Option<(u64, Arc<ContactJacobian<T>>)>,
     pub(crate) refusal: Option<Refusal>,
+}
+
+/// States from which the steps between them are taken again. There are at most twice as many as steps between two.
+#[derive(Debug)]
+pub(crate) struct Checkpoints<T> {
+    /// States at steps 0, `every`, 2 `every`, …
+    pub(crate) list: Vec<(State<T>, History<T>)>,
+    pub(crate) every: usize,
+    /// The sizes of all steps.
+    pub(crate) sizes: Vec<f64>,
+}
+
+impl<T: Real> Checkpoints<T> {
+    pub(crate) fn new(state: State<T>, history: History<T>) -> Self {
+        Self { list: vec![(state, history)], every: 1, sizes: Vec::new() }
+    }
+
+    /// Adds a step of size h, and the state at its end if it is to be kept.
+    fn push(&mut self, h: f64, state: &State<T>, history: &History<T>) {
+        self.sizes.push(h);
+        if self.sizes.len() % self.every != 0 {
+            return;
+        }
+        self.list.push((state.clone(), history.clone()));
+        if self.list.len() > 2 * self.every + 1 {
+            let mut number = 0;
+            self.list.retain(|_| {
+                number += 1;
+                number % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
 }
 
 /// The past states at the start of a run.
@@ -162,7 +197,8 @@ impl<T> Changes<T> {
 impl<T: Real> Tape<T> {
     /// An empty tape.
     pub(crate) fn new(start: State<T>, past: StartingPast) -> Self {
-        Self { start, past, steps: Vec::new(), stages: Vec::new(), rows: None, refusal: None }
+        let (steps, stages) = (Vec::new(), Vec::new());
+        Self { start, past, steps, checkpoints: None, stages, rows: None, refusal: None }
     }
 
     /// Refuses a gradient of this run, for the first reason given.
@@ -192,9 +228,17 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// Makes the stages recorded last an accepted step.
-    pub(crate) fn end_step(&mut self, h: f64, starts: bool, state: State<T>, extrapolates: bool) {
-        let stages = std::mem::take(&mut self.stages);
-        self.steps.push(StepRecord { h, starts, stages, state, extrapolates });
+    /// Makes the stages recorded last an accepted step, which ends with a state and a history.
+    pub(crate) fn end_step(&mut self, (starts, extrapolates): (bool, bool), state: &State<T>, history: &History<T>) {
+        let (stages, h) = (std::mem::take(&mut self.stages), history.made_with);
+        match &mut self.checkpoints {
+            Some(checkpoints) => checkpoints.push(h, state, history),
+            None => self.steps.push(StepRecord { h, starts, stages, state: state.clone(), extrapolates }),
+        }
+    }
+
+    /// Number of steps recorded.
+    pub(crate) fn len(&self) -> usize {
+        self.checkpoints.as_ref().map_or(self.steps.len(), |checkpoints| checkpoints.sizes.len())
     }
 }

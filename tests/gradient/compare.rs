@@ -39,7 +39,7 @@ pub(crate) fn compare(
 }
 
 /// A sum that reads everything that an objective can read.
-fn objective(step: &RecordedStep<'_, f64>, seed: &mut Seed<'_, f64>) -> f64 {
+pub(crate) fn objective(step: &RecordedStep<'_, f64>, seed: &mut Seed<'_, f64>) -> f64 {
     let state = step.state;
     let (t, dofs) = (state.time(), state.displacement().len());
     let weight = step.h * (1.0 + (3.0 * t).cos());

@@ -1,8 +1,9 @@
 //! Bodies with many contacts, large strains, supports, and steps that change.
 
-use crate::compare::{assert_equal, compare};
+use crate::compare::{AT, assert_equal, compare, objective};
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::gradient::Scales;
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Result,
     Simulation, StepControl, TimeIntegrator,
@@ -161,5 +162,29 @@ fn a_mass_that_slides() {
             let error = compare(&build, &|run| run.run_until(0.4, &mut ()).map(drop), (varied, 0.1)).unwrap();
             assert_equal(&error, &format!("{height}, {speed}, {pull}: {}", schemes()[number].name()));
         }
+    }
+}
+
+/// Steps taken again from checkpoints give the same digits, and leave the run as it was.
+#[test]
+fn checkpoints_change_nothing() {
+    let controls = [None, Some(StepControl::halving(0.013 / 16.0).unwrap().contact_changes(1).unwrap())];
+    for (number, control) in (0..schemes().len()).map(|number| (number, controls[0])).chain([(0, controls[1])]) {
+        let run = |by_checkpoints: bool| {
+            let mut run = driven(&AT, schemes().swap_remove(number), control).unwrap();
+            if by_checkpoints { run.record_checkpoints() } else { run.record() }.unwrap();
+            let gradients = [0.7, 1.3].map(|end| {
+                run.run_until(end, &mut ()).unwrap();
+                let mut scales = Scales::default();
+                (run.gradient(&mut objective, &mut scales).unwrap(), scales)
+            });
+            run.run_until(2.0, &mut ()).unwrap();
+            (gradients, run.state().clone(), run.impulses_on_dofs().to_vec(), *run.statistics())
+        };
+        let [all, some] = [run(false), run(true)];
+        assert_eq!(all, some, "{}", schemes()[number].name());
+        let mut plain = driven(&AT, schemes().swap_remove(number), control).unwrap();
+        plain.run_until(2.0, &mut ()).unwrap();
+        assert_eq!((plain.state(), plain.statistics()), (&all.1, &all.3), "{}", schemes()[number].name());
     }
 }

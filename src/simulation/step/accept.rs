@@ -137,7 +137,7 @@ impl<T: Real> Simulation<'_, T> {
         statistics.contact_changes += changes.count as u64;
         statistics.steps += 1;
         if let Some(tape) = &mut work.tape {
-            tape.end_step(history.made_with, self.compiled.startup.is_some(), state.clone(), !changes.jumps);
+            tape.end_step((self.compiled.startup.is_some(), !changes.jumps), state, history);
         }
         if history.known == scheme.depth {
             self.compiled.startup = None;
