@@ -32,6 +32,8 @@ pub(super) struct Back<'b, T: Real> {
     /// W of a stage, and its version if it is factorized.
     pub(super) factor: DenseCholesky<T>,
     pub(super) factorized: Option<u64>,
+    /// Vectors that are used again.
+    spare: Vec<Vec<T>>,
 }
 
 impl<T: Real> Back<'_, T> {
@@ -44,6 +46,24 @@ impl<T: Real> Back<'_, T> {
             self.factorized = None;
         }
         self.version
+    }
+
+    /// A vector of zeros.
+    pub(super) fn zeros(&mut self, entries: usize) -> Vec<T> {
+        let mut values = self.spare.pop().unwrap_or_default();
+        values.clear();
+        values.resize(entries, T::zero());
+        values
+    }
+
+    /// A motion of zeros.
+    pub(super) fn zero_motion(&mut self, dofs: usize) -> Motion<T> {
+        Motion { t: 0.0, u: self.zeros(dofs), v: self.zeros(dofs), a: self.zeros(dofs) }
+    }
+
+    /// Takes vectors back that are not needed any more.
+    pub(super) fn give(&mut self, values: impl IntoIterator<Item = Vec<T>>) {
+        self.spare.extend(values);
     }
 
     /// Sets prescribed dofs, which do not depend on anything, to zero.
@@ -83,6 +103,7 @@ pub(super) fn run_backward<T: Real>(
         version: VERSIONS,
         factor: DenseCholesky::default(),
         factorized: None,
+        spare: Vec::new(),
     };
     // The derivatives by the newest state, and by the states before it.
     let states = (0..=run.scheme.slots()).map(|_| Motion::zero(dofs)).collect();
@@ -103,7 +124,7 @@ pub(super) fn run_backward<T: Real>(
         Some(checkpoints) => checkpoints.sizes.first().copied(),
     };
     let h = h.unwrap_or(run.history.clock.h);
-    let seeds = way.seed((0, h), &tape.start);
+    let seeds = way.seed((0, h), &tape.start, &mut back);
     let [displacement, velocity] = start::start_back((run, tape, h), &mut back, seeds, way.states)?;
     let [gaps, friction] = [back.gaps, back.friction].map(|map| map.into_iter().collect());
     Ok(Gradient { value: way.value, displacement, velocity, gaps, friction })
@@ -135,23 +156,26 @@ impl<T: Real> Way<'_, T> {
         (steps, first): (&[StepRecord<T>], usize),
     ) -> Result<()> {
         for (place, step) in steps.iter().enumerate().rev() {
-            let seeds = self.seed((first + place + 1, step.h), &step.state);
+            let mut seeds = self.seed((first + place + 1, step.h), &step.state, back);
             let [shares, past] = rate_shares(&run.scheme.shifts, step.extrapolates);
             for field in 0..2 {
                 T::axpy(shares[field], &seeds.rates[field], self.states[0].field_mut(field + 1));
-                T::axpy(past[field], &seeds.rates[field], self.states[1].field_mut(field + 1));
+                if past[field] != T::zero() {
+                    T::axpy(past[field], &seeds.rates[field], self.states[1].field_mut(field + 1));
+                }
             }
+            back.give(seeds.rates.iter_mut().map(std::mem::take));
             step_back((run, &mut self.starter), back, step, &seeds, &mut self.states)?;
         }
         Ok(())
     }
 
     /// Asks the objective for its term of a state.
-    fn seed(&mut self, (step, h): (usize, f64), state: &State<T>) -> Seeds<T> {
+    fn seed(&mut self, (step, h): (usize, f64), state: &State<T>, back: &mut Back<'_, T>) -> Seeds<T> {
         let motion = &mut self.states[0];
         let (dofs, rows) = (motion.u.len(), state.contacts.lambda.len());
-        let zero = |entries: usize| vec![T::zero(); entries];
-        let mut seeds = Seeds { rates: [zero(dofs), zero(dofs)], force: zero(rows), impulse: zero(rows) };
+        let mut zeros = |entries: usize| back.zeros(entries);
+        let mut seeds = Seeds { rates: [zeros(dofs), zeros(dofs)], force: zeros(rows), impulse: zeros(rows) };
         let [velocity, acceleration] = &mut seeds.rates;
         let mut seed = Seed {
             displacement: &mut motion.u,
@@ -187,8 +211,10 @@ fn step_back<T: Real>(
     let dofs = run.parts.system.dofs();
     let (count, rows) = (step.stages.len(), seeds.force.len());
     // States between the stages are read within the step only.
-    states.splice(1..1, (1..count).map(|_| Motion::zero(dofs)));
-    let no_force = vec![T::zero(); rows];
+    for _ in 1..count {
+        states.insert(1, back.zero_motion(dofs));
+    }
+    let no_force = back.zeros(rows);
     let Simulation { parts, compiled, work, .. } = run;
     let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);
     for (place, (stage, record)) in program.stages.iter().zip(&step.stages).enumerate().rev() {
@@ -209,8 +235,10 @@ fn step_back<T: Real>(
         back.hold(&mut new);
         let versions = &mut work.contact.rows.problem.versions;
         let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, back, versions };
-        solved.undo((&raw, &seeds.impulse), &new, states)?;
+        solved.undo((&raw, &seeds.impulse), &mut new, states)?;
+        back.give([raw, new.u, new.v, new.a]);
     }
-    states.push(Motion::zero(dofs));
+    back.give([no_force]);
+    states.push(back.zero_motion(dofs));
     Ok(())
 }

@@ -31,7 +31,8 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         new: &mut Motion<T>,
         past: &mut [Motion<T>],
     ) -> Result<Vec<T>> {
-        let mut raw = force.to_vec();
+        let mut raw = self.back.zeros(force.len());
+        raw.copy_from_slice(force);
         for change in record.changes.iter().rev().filter(|change| !change.rows.is_empty()) {
             let damped = if change.damps { Some(self.damped(&new.a)?) } else { None };
             let motion = match change.state {

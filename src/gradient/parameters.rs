@@ -124,19 +124,23 @@ pub struct Scales<T> {
     pub load: T,
     /// dJ/ds_λ.
     pub contact: T,
+    work: [Vec<T>; 3],
 }
 
 impl<T: Real> Parameters<T> for Scales<T> {
     fn force(&mut self, system: &mut dyn System<T>, at: &Balance<'_, T>, w: &[T]) -> Result<()> {
         let (u, v) = (at.displacement, at.velocity);
-        let zero = || vec![T::zero(); w.len()];
-        let [mut load, mut damping, mut all] = [zero(), zero(), zero()];
-        system.external_load(at.t, &mut load)?;
-        if let Some(law) = system.damping_force() {
-            law.evaluate(u, v, &mut damping)?;
+        for values in &mut self.work {
+            values.clear();
+            values.resize(w.len(), T::zero());
         }
-        system.force(at.t, u, v, &mut all)?;
-        for (((&w, &load), &damping), &all) in w.iter().zip(&load).zip(&damping).zip(&all) {
+        let [load, damping, all] = &mut self.work;
+        system.external_load(at.t, load)?;
+        if let Some(law) = system.damping_force() {
+            law.evaluate(u, v, damping)?;
+        }
+        system.force(at.t, u, v, all)?;
+        for (((&w, &load), &damping), &all) in w.iter().zip(&*load).zip(&*damping).zip(&*all) {
             self.load += w * load;
             self.damping -= w * damping;
             self.stiffness -= w * (load - damping - all);
@@ -145,9 +149,11 @@ impl<T: Real> Parameters<T> for Scales<T> {
     }
 
     fn inertia(&mut self, system: &mut dyn System<T>, a: &[T], w: &[T]) -> Result<()> {
-        let mut product = vec![T::zero(); w.len()];
-        system.mass().add_product(T::one(), a, &mut product);
-        self.mass -= w.iter().zip(&product).map(|(&w, &product)| w * product).sum::<T>();
+        let [product, ..] = &mut self.work;
+        product.clear();
+        product.resize(w.len(), T::zero());
+        system.mass().add_product(T::one(), a, product);
+        self.mass -= w.iter().zip(&*product).map(|(&w, &product)| w * product).sum::<T>();
         Ok(())
     }
 

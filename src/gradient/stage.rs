@@ -38,30 +38,46 @@ pub(super) struct StageBack<'s, 'b, T: Real> {
 impl<T: Real> StageBack<'_, '_, T> {
     /// From the derivatives by the new state, by raw multipliers and by impulses to those by past states, gaps and
     /// parameters.
-    pub(super) fn undo(&mut self, (raw, impulse): (&[T], &[T]), new: &Motion<T>, past: &mut [Motion<T>]) -> Result<()> {
+    pub(super) fn undo(
+        &mut self,
+        (raw, impulse): (&[T], &[T]),
+        new: &mut Motion<T>,
+        past: &mut [Motion<T>],
+    ) -> Result<()> {
         let record = self.record;
         let read: Vec<T> = record.held.iter().map(|held| raw[held.row] + record.impulse * impulse[held.row]).collect();
-        let mut d = vec![T::zero(); new.u.len()];
+        let mut w = self.back.zeros(new.u.len());
         for (field, weight) in self.stage.recovery.weights().into_iter().enumerate() {
-            T::axpy(weight, new.field(field), &mut d);
+            T::axpy(weight, new.field(field), &mut w);
         }
-        self.back.prescribed.iter().for_each(|&dof| d[dof] = T::zero());
-        let q = self.solve(&read, &mut d)?;
-        let w = d;
+        self.back.prescribed.iter().for_each(|&dof| w[dof] = T::zero());
+        let q = self.solve(&read, &mut w)?;
 
-        let Self { system, stage, back, .. } = self;
+        let Self { system, back, .. } = self;
         let Motion { t, u, v, a } = &record.balance;
         back.parameters.force(&mut **system, &Balance { t: *t, displacement: u, velocity: v, acceleration: a }, &w)?;
         back.parameters.inertia(&mut **system, a, &w)?;
-
-        let mut predicted = Motion::zero(w.len());
+        let mut predicted = back.zero_motion(w.len());
         back.tangents.add_stiffness(&**system, -T::one(), &w, &mut predicted.u);
         back.tangents.add_damping(&**system, -T::one(), &w, &mut predicted.v);
         system.mass().add_product(-T::one(), &w, &mut predicted.a);
-        let [mut target, mut slip] = [0; 2].map(|_| vec![T::zero(); w.len()]);
+        if !record.held.is_empty() {
+            self.undo_conditions(&q, new, &mut predicted, past);
+        }
+        self.stage.recovery.transpose([&new.u, &new.v, &new.a], past);
+        self.stage.balanced().transpose([&predicted.u, &predicted.v, &predicted.a], past);
+        self.back.give([w, predicted.u, predicted.v, predicted.a]);
+        Ok(())
+    }
+
+    /// From the derivatives q by δs to those by the gaps, and by the motions that the conditions read: the predicted
+    /// motion of the balance, the new state and the past.
+    fn undo_conditions(&mut self, q: &[T], new: &mut Motion<T>, predicted: &mut Motion<T>, past: &mut [Motion<T>]) {
+        let Self { stage, record, back, .. } = self;
+        let [mut target, mut slip] = [0; 2].map(|_| back.zeros(new.u.len()));
         // Contact on velocities does not read the gap.
         let reads_gap = stage.contact.as_ref().is_none_or(|target| target.forecast.is_none());
-        for (held, &q) in record.held.iter().zip(&q) {
+        for (held, &q) in record.held.iter().zip(q) {
             match held.compliance {
                 _ if held.is_slip => {
                     record.rows.scatter(held.row, -q, &mut slip);
@@ -79,28 +95,25 @@ impl<T: Real> StageBack<'_, '_, T> {
                 *back.gaps.entry(held.id).or_insert(T::zero()) -= q;
             }
         }
-        let mut recovered = new.clone();
         match &stage.contact {
             Some(contact) => contact.row.transpose(&target, past),
             // Contact is imposed on the displacements of the state.
-            None => T::axpy(T::one(), &target, &mut recovered.u),
+            None => T::axpy(T::one(), &target, &mut new.u),
         }
         if record.held.iter().any(|held| held.is_slip) {
             match (slip_source(stage, false).0, &stage.contact) {
-                (SlipSource::Velocity(scale), _) => T::axpy(scale, &slip, &mut recovered.v),
+                (SlipSource::Velocity(scale), _) => T::axpy(scale, &slip, &mut new.v),
                 (SlipSource::Target, Some(contact)) => contact.row.transpose(&slip, past),
                 (SlipSource::Target | SlipSource::WayAhead | SlipSource::Way, _) => stage.way.transpose(&slip, past),
             }
         }
-        stage.recovery.transpose([&recovered.u, &recovered.v, &recovered.a], past);
-        stage.balanced().transpose([&predicted.u, &predicted.v, &predicted.a], past);
-        Ok(())
+        back.give([target, slip]);
     }
 
     /// d̄ becomes w; returns the derivatives by δs: q/τ, or Pᵀ ψ.
     fn solve(&mut self, read: &[T], d: &mut [T]) -> Result<Vec<T>> {
         let size = self.operator.interface();
-        let [mut interface, mut response, mut forces] = [0; 3].map(|_| vec![T::zero(); size]);
+        let [mut interface, mut response, mut forces] = [0; 3].map(|_| self.back.zeros(size));
         self.operator.begin(d, &mut interface)?;
         let held = &self.record.held;
         let weights: Vec<T> = held.iter().map(|held| self.weight(held)).collect();
@@ -126,6 +139,7 @@ impl<T: Real> StageBack<'_, '_, T> {
             forces.iter_mut().for_each(|force| *force = -*force);
         }
         self.operator.finish(d, &interface, &forces)?;
+        self.back.give([interface, response, forces]);
         if !has_slip {
             // c δλ = δs.
             let g = &*self.record.rows;

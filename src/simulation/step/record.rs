@@ -9,9 +9,10 @@ use crate::simulation::stage::StageSolve;
 use crate::state::{Compliance, Held, Motion, Rule, SLIDES_IN_SPACE, StageRecord, TURNS, Tape, slides};
 
 impl<T: Real> StageSolve<'_, '_, T> {
-    /// Records the solution d of the stage, before corrections. `impulse` is the impulse of a unit multiplier.
-    pub(super) fn record(&mut self, tape: &mut Tape<T>, d: &[T], impulse: T) -> Result<()> {
-        let balance = self.balance(d);
+    /// Records the solution of the stage, before corrections: d of Newton's method, or the increment. `impulse` is the
+    /// impulse of a unit multiplier.
+    pub(super) fn record(&mut self, tape: &mut Tape<T>, d: Option<&[T]>, impulse: T) -> Result<()> {
+        let balance = self.balance(d.unwrap_or(&self.vectors.increment));
         let mut readings = Vec::new();
         let mut held = Vec::new();
         for row in 0..self.constraints.len() {

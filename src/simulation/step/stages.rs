@@ -64,8 +64,8 @@ impl<T: Real> Simulation<'_, T> {
             let covector = start_covector.unwrap_or(&stage.covector);
             let impulse_weight = impulse_weight(stage.response, covector);
             if let Some(tape) = tape {
-                let d = newton.as_ref().map_or(&solve.vectors.increment, |newton| &newton.d);
-                solve.record(tape, &d.clone(), T::of(clock.h * impulse_weight))?;
+                let d = newton.as_ref().map(|newton| &newton.d[..]);
+                solve.record(tape, d, T::of(clock.h * impulse_weight))?;
             }
             solve.set_support_accelerations();
             solve.set_massless_rates(place, history.made_with, &history.slopes);
