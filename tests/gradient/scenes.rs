@@ -52,8 +52,8 @@ fn a_block_on_a_plane() {
 /// Large strains: tangents along the way back.
 #[test]
 fn a_soft_block_on_a_plane() {
-    for law in [Law::StVenantKirchhoff, Law::NeoHookean] {
-        for number in 0..schemes().len() {
+    for (law, schemes_of_law) in [(Law::StVenantKirchhoff, 0..schemes().len()), (Law::NeoHookean, 1..2)] {
+        for number in schemes_of_law {
             let build = |at: &[f64]| {
                 let solid = block(at);
                 // The weight is the load: M g with a density of 1.
