@@ -24,6 +24,7 @@ pages! {
     ContactTies = "docs/contact/ties.md";
     ComingFrom = "docs/coming_from.md";
     Friction = "docs/friction.md";
+    Gradients = "docs/gradients.md";
     Performance = "docs/performance.md";
     Reduction = "docs/reduction.md";
     Bars = "docs/tutorials/bars.md";

@@ -12,6 +12,7 @@ use crate::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, WorkBalance,
     ZeroAcceleration,
 };
+use crate::gradient::{Parameters, Scales};
 use crate::observer::{ContactRecorder, DofRecorder, EnergyRecorder};
 use crate::{
     ActiveSet, Automatic, ByBody, Cholesky, ConjugateGradients, ContactConstraint, ContactSolver, Corrector, Diagonal,
@@ -39,6 +40,9 @@ pub fn instances() -> Vec<*const ()> {
         Simulation::<'static, f64>::reactions as *const (),
         Simulation::<'static, f64>::restart as *const (),
         Simulation::<'static, f64>::set_step_size as *const (),
+        Simulation::<'static, f64>::record as *const (),
+        Simulation::<'static, f64>::record_checkpoints as *const (),
+        Simulation::<'static, f64>::gradient as *const (),
     ];
     #[cfg(feature = "serde")]
     all.extend([
@@ -67,6 +71,7 @@ pub fn instances() -> Vec<*const ()> {
     all.extend(by_trait!(dyn Corrector<f64>:
         ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, PersistencyCorrection, Release,
         TaylorPapadopoulos, WorkBalance, ZeroAcceleration));
+    all.extend(by_trait!(dyn Parameters<f64>: (), Scales<f64>));
     all.extend(by_trait!(dyn Observer<f64>: ContactRecorder<f64>, DofRecorder<f64>, EnergyRecorder<f64>));
     all
 }

@@ -25,9 +25,8 @@ pub(crate) use history::ComputedMotions;
 pub use history::History;
 pub(crate) use overclosures::Overclosures;
 pub(crate) use tape::{
-    Change, Changes, Checkpoints, Compliance, Held, Rule, StageRecord, StartingPast, StepRecord, Tape, slides,
+    Change, Changes, Checkpoints, Compliance, Guide, Held, Rule, StageRecord, StartingPast, StepRecord, Tape, slides,
 };
-pub(crate) use tape::{SLIDES_IN_SPACE, TURNS};
 
 use crate::contact::BrokenBond;
 use crate::real::Real;

@@ -2,13 +2,13 @@
 
 use super::Balance;
 use super::backward::Back;
-use super::conditions::{are_closed, solve_transposed};
+use super::conditions::{are_closed, released, solve_transposed};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::no_response;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::{CompiledStage, Operator};
-use crate::state::{Change, ContactState, Motion, Rule, StageRecord};
+use crate::state::{Change, ContactState, Guide, Motion, Rule, StageRecord};
 use crate::system::System;
 
 /// A corrected stage.
@@ -33,32 +33,45 @@ impl<T: Real> ChangesBack<'_, '_, T> {
     ) -> Result<Vec<T>> {
         let mut raw = self.back.zeros(force.len());
         raw.copy_from_slice(force);
+        // Derivatives by the totals of the velocity jumps, which give later friction its direction.
+        let mut totals = self.back.zeros(force.len());
         for change in record.changes.iter().rev().filter(|change| !change.rows.is_empty()) {
             let damped = if change.damps { Some(self.damped(&new.a)?) } else { None };
             let motion = match change.state {
                 0 => &mut *new,
                 k => &mut past[k - 1],
             };
-            let read = |row: usize| change.force * force[row] + change.impulse * impulse[row];
+            let guides = change.state == 0 && change.field == 1;
+            let read = |row: usize| {
+                let reported = change.force * force[row] + change.impulse * impulse[row];
+                reported + if guides { totals[row] } else { T::zero() }
+            };
             let psi = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
+            let closed = released(&change.rules, &psi);
             for (k, (&row, rule)) in change.rows.iter().zip(&change.rules).enumerate() {
+                if guides {
+                    raw[row] += change.share * totals[row];
+                }
                 match *rule {
                     Rule::Closed if change.field == 0 && !record.rows.is_tangential(row) => {
-                        *self.back.gaps.entry(self.contacts.ids[row]).or_insert(T::zero()) -= psi[k];
+                        *self.back.gaps.entry(self.contacts.ids[row]).or_insert(T::zero()) -= closed[k];
                     }
                     // A past displacement is moved to that of the state where the contact sticks.
-                    Rule::Closed if change.field == 0 => record.rows.scatter(row, psi[k], &mut new.u),
+                    Rule::Closed if change.field == 0 => record.rows.scatter(row, closed[k], &mut new.u),
                     Rule::Closed => {}
                     Rule::Unloaded => raw[row] -= change.share * psi[k],
-                    Rule::Slides { normal, share } => {
+                    Rule::Slides { normal, share, turn, by } => {
                         raw[row] -= change.share * psi[k];
                         raw[change.rows[normal]] += share * change.share * psi[k];
+                        let turned = change.rows[normal + 1..].iter().zip(turn).filter(|_| by == Guide::Impulse);
+                        turned.for_each(|(&row, turn)| totals[row] += turn * psi[k]);
                     }
                 }
             }
             let name = |k: usize| self.contacts.ids[self.contacts.tangents.owner(change.rows[k])];
             self.back.add_friction(&change.rules, |k| (name(k), psi[k]), |k| change.totals[k]);
         }
+        self.back.give([totals]);
         Ok(raw)
     }
 
@@ -102,8 +115,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         back.projection.apply_inverse(&mut w)?;
         let mut psi: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + read(row)).collect();
         back.solve_jumps((g, rows), rules, &mut psi, self.contacts)?;
-        let sigma: Vec<T> =
-            rules.iter().zip(&psi).map(|(rule, &psi)| if *rule == Rule::Closed { psi } else { T::zero() }).collect();
+        let sigma = released(rules, &psi);
         rows.iter().zip(&sigma).for_each(|(&row, &sigma)| g.scatter(row, -sigma, x));
         back.projection.push(g, (rows, &sigma), -T::one(), &mut w)?;
         let mut moved = vec![T::zero(); w.len()];

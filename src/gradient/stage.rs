@@ -15,7 +15,7 @@
 //! With friction the conditions are those of `conditions`.
 
 use super::backward::Back;
-use super::conditions::solve_transposed;
+use super::conditions::{released, solve_transposed};
 use super::{Balance, CompliantContact};
 use crate::contact_solver::no_response;
 use crate::error::Result;
@@ -182,8 +182,8 @@ impl<T: Real> StageBack<'_, '_, T> {
         let refuse = |row: usize| no_response(record.balance.t, held[row].id);
         solve_transposed(&mut back.factor, &rules, (entry, compliance), x).map_err(refuse)?;
         back.add_friction(&rules, |k| (held[k].id, x[k]), |k| held[k].force);
-        let open = rules.iter().zip(x).filter(|(rule, _)| **rule != Rule::Closed);
-        open.for_each(|(_, x)| *x = T::zero());
+        let released = released(&rules, x);
+        x.copy_from_slice(&released);
         Ok(())
     }
 

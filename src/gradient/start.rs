@@ -2,6 +2,7 @@
 
 use super::Balance;
 use super::backward::{Back, Seeds};
+use super::conditions::released;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::Simulation;
@@ -46,10 +47,9 @@ pub(super) fn start_back<T: Real>(
         let bound = T::of(contacts.tangents.friction(row)) * force;
         rows.push(row);
         rules.push(Rule::Closed);
-        for row in contacts.tangents.of(row) {
-            rows.push(row);
-            rules.push(Rule::of_friction(normal, [force, contacts.lambda[row]], bound));
-        }
+        let own = contacts.tangents.of(row);
+        rules.extend(Rule::of_friction(normal, force, &contacts.lambda[own.clone()], (bound, T::one())));
+        rows.extend(own);
     }
     let mut w = a;
     back.projection.apply_inverse(&mut w)?;
@@ -63,9 +63,7 @@ pub(super) fn start_back<T: Real>(
         back.solve_jumps((g, &rows), &rules, &mut psi, contacts)?;
         let name = |k: usize| contacts.ids[contacts.tangents.owner(rows[k])];
         back.add_friction(&rules, |k| (name(k), psi[k]), |k| contacts.lambda[rows[k]]);
-        let open = rules.iter().zip(&mut psi).filter(|(rule, _)| **rule != Rule::Closed);
-        open.for_each(|(_, psi)| *psi = T::zero());
-        back.projection.push(g, (&rows, &psi), -T::one(), &mut w)?;
+        back.projection.push(g, (&rows, &released(&rules, &psi)), -T::one(), &mut w)?;
     }
     let (system, start) = (&mut *parts.system, &tape.start);
     let (t, displacement) = (start.time(), start.displacement());

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::simulation::Simulation;
-use crate::state::{SLIDES_IN_SPACE, StartingPast, TURNS, slides};
+use crate::state::{StartingPast, slides};
 use crate::system::Linearity;
 
 /// Refuses a run that has a part without derivative. Returns which past it starts from.
@@ -49,7 +49,8 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
             && slides(state.contacts.tangential(row, &state.contacts.lambda), bound)
     };
     if tangents.contacts().any(slides_in_space) {
-        return refuse(SLIDES_IN_SPACE.into(), TURNS);
+        let reason = "its direction follows the initial velocities: let the bodies touch, or slide, later";
+        return refuse("friction that slides along two tangents at the start".into(), reason);
     }
     let compliant = |row: usize| state.contacts.lambda[row] != T::zero() && run.constraints.laws()[row].is_compliant();
     if (0..run.constraints.len()).any(compliant) {

@@ -66,10 +66,6 @@ pub(crate) enum StartingPast {
     Expanded,
 }
 
-/// Why friction that slides along two tangents is refused.
-pub(crate) const SLIDES_IN_SPACE: &str = "friction that slides in space";
-pub(crate) const TURNS: &str = "its direction turns, and the derivative of that is not implemented";
-
 /// Something that happened in a run and has no derivative.
 #[derive(Clone, Debug)]
 pub(crate) struct Refusal {
@@ -111,22 +107,66 @@ pub(crate) enum Rule<T> {
     Closed,
     /// It has no multiplier.
     Unloaded,
-    /// Its multiplier is `share` times that of the row at the place `normal` of the list.
-    Slides { normal: usize, share: T },
+    /// Its multiplier is `share` times that of the row at the place `normal` of the list. In space the direction of
+    /// friction turns: the multiplier falls by `turn` times the changes of two slips, or rises by it times those of
+    /// two impulses. They belong to the two rows behind the normal one.
+    Slides { normal: usize, share: T, turn: [T; 2], by: Guide },
+}
+
+/// What gives the direction of friction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Guide {
+    /// The slip, or the jump that is left, of the same conditions.
+    Slip,
+    /// The total impulses of the velocity jumps.
+    Impulse,
 }
 
 impl<T: Real> Rule<T> {
-    /// The rule of a tangential row of a contact, in a problem in which it may stick, by the multipliers of both.
-    /// `bound` is the largest friction.
-    pub(crate) fn of_friction(normal: usize, [force, friction]: [T; 2], bound: T) -> Self {
-        if bound <= T::zero() {
-            Self::Unloaded
-        } else if slides(friction.abs(), bound) {
-            Self::Slides { normal, share: friction / force }
-        } else {
-            Self::Closed
-        }
+    /// The rules of the tangential rows of a contact with the multiplier `force` that may stick, by their multipliers
+    /// and by the length of the slip. `bound` is the largest friction.
+    pub(crate) fn of_friction(
+        normal: usize,
+        force: T,
+        friction: &[T],
+        (bound, slip): (T, T),
+    ) -> impl Iterator<Item = Self> {
+        let size = friction.iter().fold(T::zero(), |size, &f| size.hypot(f));
+        let slides = bound > T::zero() && slides(size, bound) && (friction.len() == 1 || slip > T::zero());
+        let turn = if friction.len() > 1 { bound / slip } else { T::zero() };
+        (0..friction.len()).map(move |k| match slides {
+            true => {
+                Self::Slides { normal, share: friction[k] / force, turn: across(friction, k, turn), by: Guide::Slip }
+            }
+            false if bound <= T::zero() => Self::Unloaded,
+            false => Self::Closed,
+        })
     }
+
+    /// The rules of tangential rows of a contact with the multiplier `force` and the friction `direction` per unit of
+    /// it, which is along impulses of this size.
+    pub(crate) fn along(normal: usize, force: T, direction: &[T], impulse: T) -> impl Iterator<Item = Self> {
+        let size = direction.iter().fold(T::zero(), |size, &f| size.hypot(f));
+        let turn = if direction.len() > 1 && size > T::zero() { size * force / impulse } else { T::zero() };
+        (0..direction.len()).map(move |k| Self::Slides {
+            normal,
+            share: direction[k],
+            turn: across(direction, k, turn),
+            by: Guide::Impulse,
+        })
+    }
+}
+
+/// Row k of c (1 − d dᵀ) with the direction d of some friction; zero in the plane.
+fn across<T: Real>(friction: &[T], k: usize, c: T) -> [T; 2] {
+    let square = friction.iter().map(|&f| f * f).sum::<T>();
+    let entry = |j: usize| match friction.get(j) {
+        Some(&other) if c != T::zero() => {
+            c * (if j == k { T::one() } else { T::zero() } - friction[k] * other / square)
+        }
+        _ => T::zero(),
+    };
+    [entry(0), entry(1)]
 }
 
 /// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
@@ -187,7 +227,18 @@ pub(crate) struct Changes<T> {
     pub(crate) refusal: Option<Refusal>,
 }
 
-impl<T> Changes<T> {
+impl<T: Real> Changes<T> {
+    /// The length of the total impulse along the tangents of a contact in the velocity jumps solved last.
+    pub(crate) fn impulse(&self, contact: usize) -> T {
+        let velocity = |change: &&Change<T>| change.state == 0 && change.field == 1;
+        let solved = self.solved[0].as_ref().or_else(|| self.list.iter().rev().find(velocity));
+        let Some(Change { rows, rules, totals, .. }) = solved else { return T::zero() };
+        let Some(normal) = rows.iter().position(|&row| row == contact) else { return T::zero() };
+        let own = rules[normal + 1..].iter().zip(&totals[normal + 1..]);
+        let tangential = own.take_while(|(rule, _)| matches!(rule, Rule::Slides { normal: at, .. } if *at == normal));
+        tangential.fold(T::zero(), |size, (_, &total)| size.hypot(total))
+    }
+
     /// Refuses a gradient of this run, for the first reason given.
     pub(crate) fn refuse(&mut self, what: &'static str, reason: &'static str) {
         self.refusal.get_or_insert(Refusal { what, reason });

@@ -188,3 +188,25 @@ fn checkpoints_change_nothing() {
         assert_eq!((plain.state(), plain.statistics()), (&all.1, &all.3), "{}", schemes()[number].name());
     }
 }
+
+/// A block lands on a floor and slides under a side wind: its friction turns.
+#[test]
+fn friction_in_space() {
+    for number in 0..schemes().len() {
+        let build = |at: &[f64]| {
+            let material = Material { young: 100.0 * at[2], poisson: 0.3, density: at[0] };
+            let solid = Solid::<3>::block([1.0, 0.8, 0.5], [2, 1, 1], material);
+            let plane = Plane::new([0.0, 0.0, -0.0231 - at[7] / 0.2_f64.cos()], [0.2_f64.sin(), 0.0, 0.2_f64.cos()])?;
+            let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] < 1e-9).collect();
+            let contact = NodesOnObstacle::new(plane, &solid.nodes, &solid.node_dofs(), &bottom)?;
+            let factor = at[3];
+            let wind = move |t: f64, f: &mut [f64]| f.iter_mut().skip(1).step_by(3).for_each(|f| *f = factor * 0.3 * t);
+            Simulation::builder(solid.system().load(wind), schemes().swap_remove(number), 0.004)
+                .velocity(solid.uniform([0.31 * at[4], 0.1 * at[4], -1.0 * at[4]]))
+                .constraint(contact.friction(0.1 + at[6]))
+                .build()
+        };
+        let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
+        assert_equal(&error, &schemes()[number].name());
+    }
+}

@@ -3,7 +3,7 @@
 use super::Correction;
 use crate::corrector::JumpProblem;
 use crate::real::Real;
-use crate::state::{Change, Rule, SLIDES_IN_SPACE, TURNS, slides};
+use crate::state::{Change, Rule};
 
 impl<T: Real> Correction<'_, T> {
     /// Records the solved jumps of field 1 or 2 (v or a); raw multipliers contribute `share` to the totals.
@@ -42,7 +42,8 @@ impl<T: Real> Correction<'_, T> {
     /// The solution of the present problem, for a field of a state, without what is reported of it.
     fn solution(&mut self, state: usize, field: usize) -> Change<T> {
         let Self { buffers, constraints, .. } = self;
-        let JumpProblem { blocks, rows, totals, increments, .. } = &*buffers.problem;
+        let JumpProblem { blocks, rows, totals, increments, left, .. } = &*buffers.problem;
+        let impulse = |row: usize| buffers.changes.as_ref().map_or(T::zero(), |changes| changes.impulse(row));
         let mut change = Change {
             state,
             field,
@@ -62,18 +63,20 @@ impl<T: Real> Correction<'_, T> {
             if !closes && block.tangents == 0 {
                 continue;
             }
-            let friction = T::of(constraints.0.tangents().friction(block.row));
-            let tangential = totals[block.places()].iter().skip(1).fold(T::zero(), |size, &f| size.hypot(f));
-            if block.tangents > 1 && tangential > T::zero() && slides(tangential, friction * total) {
-                buffers.changes.iter_mut().for_each(|changes| changes.refuse(SLIDES_IN_SPACE, TURNS));
+            let tangential = block.places().start + 1..block.places().end;
+            change.rules.push(if closes { Rule::Closed } else { Rule::Unloaded });
+            match block.direction {
+                Some(direction) => {
+                    let direction = &direction[..block.tangents];
+                    change.rules.extend(Rule::along(normal, total, direction, impulse(block.row)));
+                }
+                None => {
+                    let bound = T::of(constraints.0.tangents().friction(block.row)) * total;
+                    let slip = left[tangential.clone()].iter().fold(T::zero(), |size, &slip| size.hypot(slip));
+                    change.rules.extend(Rule::of_friction(normal, total, &totals[tangential], (bound, slip)));
+                }
             }
             for place in block.places() {
-                change.rules.push(match (place == block.place, block.direction) {
-                    (true, _) if closes => Rule::Closed,
-                    (true, _) => Rule::Unloaded,
-                    (false, Some([along, _])) => Rule::Slides { normal, share: along },
-                    (false, None) => Rule::of_friction(normal, [total, totals[place]], friction * total),
-                });
                 change.rows.push(rows[place]);
                 change.multipliers.push(increments[place]);
                 change.totals.push(totals[place]);

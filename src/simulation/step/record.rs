@@ -5,12 +5,13 @@ use crate::corrector::Gaps;
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::half_digits;
+use crate::simulation::rows::slip::{Source, source};
 use crate::simulation::stage::StageSolve;
-use crate::state::{Compliance, Held, Motion, Rule, SLIDES_IN_SPACE, StageRecord, TURNS, Tape, slides};
+use crate::state::{Compliance, Held, Motion, Rule, StageRecord, Tape};
 
 impl<T: Real> StageSolve<'_, '_, T> {
-    /// Records the solution of the stage, before corrections: d of Newton's method, or the increment. `impulse` is the
-    /// impulse of a unit multiplier.
+    /// Records a solved stage before corrections; its solution is d, or the increment. `impulse` is the impulse of a unit
+    /// multiplier.
     pub(super) fn record(&mut self, tape: &mut Tape<T>, d: Option<&[T]>, impulse: T) -> Result<()> {
         let balance = self.balance(d.unwrap_or(&self.vectors.increment));
         let mut readings = Vec::new();
@@ -41,18 +42,28 @@ impl<T: Real> StageSolve<'_, '_, T> {
             let (normal, rule) = (held.len(), Rule::Closed);
             held.push(Held { row, id, rule, force, is_slip: false, compliance });
             let (tangents, raw) = (self.constraints.tangents(), &self.contact.trial.lambda_raw);
-            let bound = T::of(tangents.friction(row)) * force;
-            if tangents.of(row).len() > 1 && slides(self.contact.trial.tangential(row, raw), bound) {
-                tape.refuse(SLIDES_IN_SPACE, TURNS);
-            }
-            for row in tangents.of(row) {
-                let rule = Rule::of_friction(normal, [force, raw[row]], bound);
+            let (own, bound) = (tangents.of(row), T::of(tangents.friction(row)) * force);
+            let rules = Rule::of_friction(normal, force, &raw[own.clone()], (bound, self.slip(row)));
+            for (row, rule) in own.zip(rules) {
                 held.push(Held { row, id, rule, force: raw[row], is_slip: true, compliance: None });
             }
         }
         let rows = tape.rows(self.g, self.constraints.version());
         tape.stages.push(StageRecord { balance, rows, held, impulse, changes: Vec::new() });
         Ok(())
+    }
+
+    /// The length of the slip of a contact as the conditions of the stage measure it.
+    fn slip(&self, row: usize) -> T {
+        let Self { stage, clock, constraints, contact, .. } = self;
+        let (tangents, h) = (constraints.tangents(), T::of(clock.h));
+        let first = tangents.all().start;
+        let slip = tangents.of(row).fold(T::zero(), |size, k| size.hypot(contact.trial.slip[k - first]));
+        slip * match (source(stage, false).0, &stage.contact) {
+            (Source::Velocity(scale), _) => scale,
+            (Source::WayAhead, Some(ahead)) => T::of(ahead.at - stage.end) * h,
+            (Source::Target | Source::WayAhead | Source::Way, _) => h,
+        }
     }
 
     /// Gap of each row, and the part of its rate that does not come from velocities, where the balance holds.

@@ -63,17 +63,19 @@ impl<T: Real> Simulation<'_, T> {
 
             let covector = start_covector.unwrap_or(&stage.covector);
             let impulse_weight = impulse_weight(stage.response, covector);
+            solve.set_support_accelerations();
+            solve.set_massless_rates(place, history.made_with, &history.slopes);
+            if solve.constraints.len() > 0 {
+                let booking = Booking { impulse_weight, is_first: place == 0, is_last: place + 1 == stages };
+                solve.close(&booking, &mut correction.buffers)?;
+            }
             if let Some(tape) = tape {
                 let d = newton.as_ref().map(|newton| &newton.d[..]);
                 solve.record(tape, d, T::of(clock.h * impulse_weight))?;
             }
-            solve.set_support_accelerations();
-            solve.set_massless_rates(place, history.made_with, &history.slopes);
             if solve.constraints.len() == 0 {
                 continue;
             }
-            let booking = Booking { impulse_weight, is_first: place == 0, is_last: place + 1 == stages };
-            solve.close(&booking, &mut correction.buffers)?;
             if let Some(excess) = excess {
                 excess.book(stage, clock.h, &correction.buffers.switching, &mut solve.contact.trial);
             }
