@@ -33,8 +33,7 @@ fn main() -> Result<()> {
     for cells in arguments.sizes {
         row(&format!("block of {cells}³ on a plane"), &block(cells, None), (40, samples))?;
         if cells <= 10 {
-            let name = format!("the same, St. Venant–Kirchhoff");
-            row(&name, &block(cells, Some(Law::StVenantKirchhoff)), (20, samples))?;
+            row("the same, St. Venant–Kirchhoff", &block(cells, Some(Law::StVenantKirchhoff)), (20, samples))?;
         }
     }
     Ok(())
@@ -69,7 +68,7 @@ fn row(name: &str, build: &Build, (steps, samples): (usize, usize)) -> Result<()
         };
         let advance = |run: &mut Simulation<'_, f64>| (0..steps).try_for_each(|_| run.step());
         let back = |run: &mut Simulation<'_, f64>| run.gradient(&mut objective, &mut Scales::default()).map(drop);
-        let [mut plain, mut recorded, mut saving] = [build()?, build()?, build()?];
+        let (mut plain, mut recorded, mut saving) = (build()?, build()?, build()?);
         recorded.record()?;
         saving.record_checkpoints()?;
         times[0].push(timed(&mut || advance(&mut plain))?);
@@ -80,7 +79,7 @@ fn row(name: &str, build: &Build, (steps, samples): (usize, usize)) -> Result<()
         dofs = plain.system().dofs();
         closed = closed.max(recorded.state().contacts().closed().iter().filter(|closed| **closed).count());
     }
-    let [plain, recorded, back, saving] = times.map(|mut times| median(&mut times));
+    let [plain, recorded, back, saving] = times.map(|times| median(&times));
     println!(
         "{name:<30} {dofs:>7} {closed:>6} {steps:>6} {:>9.1} {:>9.2} {:>7.2} {:>12.2}",
         plain * 1e6,

@@ -119,6 +119,10 @@ pub struct Requirements {
     /// Contacts under [`ContactLaw::Restitution`](crate::contact::ContactLaw) rebound with the required share of their
     /// approach rate, in a scheme that imposes contact on the displacements of the state. Default: they do not.
     pub restitution: Verdict,
+    /// The [gradient](crate::gradient) of a run passes through the corrector: it changes the motion only by
+    /// [`push_velocity`](Correction::push_velocity), [`push_acceleration`](Correction::push_acceleration) and
+    /// [`project_past`](Correction::project_past). Default: it does not.
+    pub gradient: Verdict,
 }
 
 /// `Ok` if a corrector supports a case, or the reason for the refusal.
@@ -134,6 +138,7 @@ impl Default for Requirements {
             restitution: Err(
                 "the corrector does not support restitution: choose `PersistencyCorrection::with_history_projection`",
             ),
+            gradient: Err("its derivative is not known: choose `PersistencyCorrection`, or none"),
         }
     }
 }
@@ -155,22 +160,16 @@ pub struct Effects {
     pub corrects_massless: bool,
     /// [`predict`](Corrector::predict) does something; its memory is reserved only then.
     pub predicts: bool,
-    /// [`correct`](Corrector::correct) changes the motion only by [`push_velocity`](Correction::push_velocity),
-    /// [`push_acceleration`](Correction::push_acceleration) and [`project_past`](Correction::project_past), so that
-    /// the [gradient](crate::gradient) of a run passes through it. Runs with other correctors are not recorded.
-    pub is_differentiable: bool,
 }
 
 impl Effects {
     /// The effects of several correctors together.
     pub(crate) fn of_all<T: Real>(correctors: &[Box<dyn Corrector<T> + '_>]) -> Self {
-        let none = Self { is_differentiable: true, ..Self::default() };
-        correctors.iter().map(Corrector::effects).fold(none, |all, own| Self {
+        correctors.iter().map(Corrector::effects).fold(Self::default(), |all, own| Self {
             edits: all.edits.max(own.edits),
             leaves_smooth_motion: all.leaves_smooth_motion || own.leaves_smooth_motion,
             corrects_massless: all.corrects_massless || own.corrects_massless,
             predicts: all.predicts || own.predicts,
-            is_differentiable: all.is_differentiable && own.is_differentiable,
         })
     }
 }

@@ -58,13 +58,15 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] names the part of the run that has no derivative here, or that is not supported:
-    /// friction, rows that turn (curved obstacles, meshes that slide on each other), dofs without mass, ranks,
-    /// correctors other than [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices,
-    /// path forces, nonlinear damping with a correction; a run that has taken steps. Other [contact laws](crate::ContactLaw) than `Rigid`,
-    /// `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, and changes of the step
-    /// size with a scheme that reads more than u, v and a of the last state, are refused by
-    /// [`gradient`](Self::gradient) if they occurred.
+    /// [`Error::Incompatible`] names the part that has no derivative here: rows that turn (curved obstacles, meshes that
+    /// slide on each other), dofs without mass, ranks, correctors other than
+    /// [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices, forces along a path,
+    /// nonlinear damping with a correction, at the start a force of a compliant law or friction that slides in space;
+    /// and a run that has taken steps.
+    ///
+    /// [`gradient`](Self::gradient) refuses what occurred in the run: forces under other [laws](crate::ContactLaw) than
+    /// `Rigid`, `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, changes of the step size if the
+    /// scheme reads more than u, v and a of the last state, restarts, and damping that a step does not resolve.
     pub fn record(&mut self) -> Result<()> {
         self.check_sound()?;
         let past = support::check(self)?;
@@ -99,11 +101,11 @@ impl<T: Real> Simulation<'_, T> {
     /// ```
     /// use contact_dynamics::faer::sparse::SparseColMat;
     /// use contact_dynamics::gradient::{RecordedStep, Seed};
-    /// use contact_dynamics::{GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
+    /// use contact_dynamics::{ContactLaw, GeneralizedAlpha, LinearRows, LinearSystem, Simulation};
     ///
     /// // A ball of mass 2 falls on a bed of stiffness 800. How does the largest force depend on the speed?
     /// let free = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[])?;
-    /// let bed = LinearRows::new().penalty(800.0, &[(0, 1.0)], 0.1);
+    /// let bed = LinearRows::new().row(ContactLaw::Penalty { stiffness: 800.0 }, &[(0, 1.0)], 0.1);
     /// let mut run = Simulation::builder(LinearSystem::lumped(vec![2.0], free)?, GeneralizedAlpha::default(), 1e-4)
     ///     .velocity(vec![-3.0])
     ///     .constraint(bed)

@@ -129,7 +129,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
                 Err("what leaves has neither its old velocity nor the force of the impact: choose both parts")
             }
         };
-        Requirements { friction: Ok(()), restitution, ..Requirements::default() }
+        Requirements { friction: Ok(()), restitution, gradient: Ok(()), ..Requirements::default() }
     }
 
     fn effects(&self) -> Effects {
@@ -137,7 +137,7 @@ impl<T: Real> Corrector<T> for PersistencyCorrection {
             HistoryProjection::Off => Edits::NewState,
             HistoryProjection::On => Edits::Past,
         };
-        Effects { edits, is_differentiable: true, ..Effects::default() }
+        Effects { edits, ..Effects::default() }
     }
 
     fn correct(&self, step: &mut Correction<'_, T>) -> Result<()> {

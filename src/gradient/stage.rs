@@ -136,7 +136,9 @@ impl<T: Real> StageBack<'_, '_, T> {
             }
             self.operator.answer(g, (&rows, &multipliers), &mut forces, &mut response);
             T::axpy(-T::one(), &response, &mut interface);
-            forces.iter_mut().for_each(|force| *force = -*force);
+            for force in &mut forces {
+                *force = -*force;
+            }
         }
         self.operator.finish(d, &interface, &forces)?;
         self.back.give([interface, response, forces]);

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::Simulation;
+use crate::simulation::{Operator, Simulation};
 use crate::state::{StartingPast, slides};
 use crate::system::Linearity;
 
@@ -20,8 +20,8 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
         return refuse("dofs without mass".into(), "give them a mass");
     }
     for corrector in &run.parts.correctors {
-        if !corrector.effects().is_differentiable {
-            return refuse(format!("the corrector {}", corrector.name()), "choose `PersistencyCorrection`");
+        if let Err(reason) = corrector.requirements(&run.scheme.tableau).gradient {
+            return refuse(format!("the corrector {}", corrector.name()), reason);
         }
     }
     if !run.constraints.is_affine() {
@@ -38,7 +38,7 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
     if nonlinear && compiled.program.stages.iter().any(|stage| stage.along_path) {
         return refuse("forces along a path".into(), "choose another scheme");
     }
-    if !compiled.program.operators.iter().all(|operator| operator.is_symmetric()) {
+    if !compiled.program.operators.iter().all(Operator::is_symmetric) {
         return refuse("an unsymmetric or iterative linear solver".into(), "choose `Automatic`");
     }
     let tangents = run.constraints.tangents();

@@ -40,7 +40,7 @@ impl<T: Real> Checkpoints<T> {
     /// Adds a step of size h, and the state at its end if it is to be kept.
     fn push(&mut self, h: f64, state: &State<T>, history: &History<T>) {
         self.sizes.push(h);
-        if self.sizes.len() % self.every != 0 {
+        if !self.sizes.len().is_multiple_of(self.every) {
             return;
         }
         self.list.push((state.clone(), history.clone()));

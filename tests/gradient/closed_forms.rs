@@ -40,7 +40,6 @@ fn a_bar_on_a_wall() {
         run.record().unwrap();
         run.run_until(1.4, &mut ()).unwrap();
         // The mean force in the middle of the contact.
-        let _ = ();
         let [force, by_v, by_e] = weighted(&mut run, |t| if (0.3..0.9).contains(&t) { 1.0 / 0.6 } else { 0.0 });
         assert!((force / 2.0 - 1.0).abs() < error, "{force}");
         assert!((by_v / 2.0 - 1.0).abs() < error, "∂F/∂v = F/v: {by_v}");

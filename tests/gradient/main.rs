@@ -2,5 +2,6 @@
 
 mod closed_forms;
 mod compare;
+mod refused;
 mod scenes;
 mod throw;

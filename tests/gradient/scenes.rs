@@ -40,7 +40,7 @@ fn a_block_on_a_plane() {
         let build = |at: &[f64]| {
             let solid = block(at);
             Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
-                .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
+                .velocity(solid.uniform([0.3 * at[4], -at[4]]))
                 .constraint(contact(&solid, at[7])?)
                 .build()
         };
@@ -60,7 +60,7 @@ fn a_soft_block_on_a_plane() {
                 let mut system = Hyperelastic::new(&solid, law);
                 system.particles.weigh([0.0, -3.0 * at[3] / at[0]]);
                 Simulation::builder(system, schemes().swap_remove(number), 0.003)
-                    .velocity(solid.uniform([0.3 * at[4], -1.0 * at[4]]))
+                    .velocity(solid.uniform([0.3 * at[4], -at[4]]))
                     .constraint(contact(&solid, at[7])?)
                     .newton(contact_dynamics::Newton::full().tolerances(1e-12, 1e-12)?)
                     .build()
@@ -130,7 +130,7 @@ fn a_block_that_slides_and_sticks() {
             let build = |at: &[f64]| {
                 let solid = block(at);
                 Simulation::builder(solid.system(), schemes().swap_remove(number), 0.003)
-                    .velocity(solid.uniform([0.31 * at[4], -1.0 * at[4]]))
+                    .velocity(solid.uniform([0.31 * at[4], -at[4]]))
                     .constraint(contact(&solid, at[7])?.friction(friction + at[6]))
                     .build()
             };
@@ -202,7 +202,7 @@ fn friction_in_space() {
             let factor = at[3];
             let wind = move |t: f64, f: &mut [f64]| f.iter_mut().skip(1).step_by(3).for_each(|f| *f = factor * 0.3 * t);
             Simulation::builder(solid.system().load(wind), schemes().swap_remove(number), 0.004)
-                .velocity(solid.uniform([0.31 * at[4], 0.1 * at[4], -1.0 * at[4]]))
+                .velocity(solid.uniform([0.31 * at[4], 0.1 * at[4], -at[4]]))
                 .constraint(contact.friction(0.1 + at[6]))
                 .build()
         };

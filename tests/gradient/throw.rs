@@ -3,7 +3,9 @@
 use crate::compare::{assert_equal, compare};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::verify::GradientError;
-use contact_dynamics::{ContactLaw, Error, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator};
+use contact_dynamics::{
+    ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator,
+};
 use contact_dynamics_scenes::schemes;
 
 /// A bar of ten elements with a load on its far end, thrown at a wall.
@@ -142,4 +144,15 @@ fn contact_at_the_start() {
     let throw = Throw { gap: 0.0, speed: 0.0, varied: 7, ..Throw::new() };
     assert!(compare_every(3, &Throw { law: ContactLaw::Equality, ..throw }, "tied") > 8);
     assert!(compare_every(3, &throw, "pressed") > 8);
+}
+
+/// Where a step does not resolve the damping, corrections apply a part of their forces, and its derivative is unknown.
+#[test]
+fn damping_that_a_step_does_not_resolve_is_refused() {
+    let throw = Throw { damping: 3.0, ..Throw::new() };
+    let result = throw.compare(&|| Box::new(GeneralizedAlpha::default()));
+    assert!(
+        matches!(&result, Err(Error::Incompatible { part, .. }) if part.contains("damping in corrected contacts")),
+        "{result:?}"
+    );
 }

@@ -65,16 +65,13 @@ impl<T: Real> Correction<'_, T> {
             }
             let tangential = block.places().start + 1..block.places().end;
             change.rules.push(if closes { Rule::Closed } else { Rule::Unloaded });
-            match block.direction {
-                Some(direction) => {
-                    let direction = &direction[..block.tangents];
-                    change.rules.extend(Rule::along(normal, total, direction, impulse(block.row)));
-                }
-                None => {
-                    let bound = T::of(constraints.0.tangents().friction(block.row)) * total;
-                    let slip = left[tangential.clone()].iter().fold(T::zero(), |size, &slip| size.hypot(slip));
-                    change.rules.extend(Rule::of_friction(normal, total, &totals[tangential], (bound, slip)));
-                }
+            if let Some(direction) = block.direction {
+                let direction = &direction[..block.tangents];
+                change.rules.extend(Rule::along(normal, total, direction, impulse(block.row)));
+            } else {
+                let bound = T::of(constraints.0.tangents().friction(block.row)) * total;
+                let slip = left[tangential.clone()].iter().fold(T::zero(), |size, &slip| size.hypot(slip));
+                change.rules.extend(Rule::of_friction(normal, total, &totals[tangential], (bound, slip)));
             }
             for place in block.places() {
                 change.rows.push(rows[place]);

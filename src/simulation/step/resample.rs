@@ -134,7 +134,7 @@ impl<T: Real> Simulation<'_, T> {
             history.known = 1;
         }
         history.clock = clock;
-        let is_kept = scheme.depth == 1 && scheme.shifts == [0.0; 2];
+        let is_kept = scheme.depth == 1 && scheme.shifts.iter().all(|&shift| shift == 0.0);
         if let Some(tape) = work.tape.as_mut().filter(|_| !is_kept) {
             tape.refuse(
                 "a change of the step size",

@@ -1,0 +1,81 @@
+//! Runs that have no gradient, or none yet, are refused by name.
+
+use contact_dynamics::contact::{Side, Sphere};
+use contact_dynamics::corrector::ZeroAcceleration;
+use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
+use contact_dynamics::gradient::{Gradient, RecordedStep, Seed};
+use contact_dynamics::{
+    ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Lu, NodesOnObstacle, Result, Simulation,
+    SimulationBuilder,
+};
+
+fn zero(_: &RecordedStep<'_, f64>, _: &mut Seed<'_, f64>) -> f64 {
+    0.0
+}
+
+fn gradient(run: &mut Simulation<'_, f64>) -> Result<Gradient<f64>> {
+    run.gradient(&mut zero, &mut ())
+}
+
+/// Three masses on springs, the first above a floor.
+fn system(masses: [f64; 3]) -> LinearSystem<'static, f64> {
+    let springs: Vec<_> = (0..3).map(|dof| Triplet::new(dof, dof, 10.0)).collect();
+    LinearSystem::lumped(masses.to_vec(), SparseColMat::try_new_from_triplets(3, 3, &springs).unwrap()).unwrap()
+}
+
+fn builder(system: LinearSystem<'static, f64>) -> SimulationBuilder<'static, f64> {
+    Simulation::builder(system, GeneralizedAlpha::default(), 0.01).velocity(vec![-1.0, 0.0, 0.0])
+}
+
+fn floor() -> LinearRows<'static, f64> {
+    LinearRows::new().unilateral(&[(0, 1.0)], 0.05)
+}
+
+fn assert_refused<R: std::fmt::Debug>(result: Result<R>, what: &str) {
+    match result {
+        Err(Error::Incompatible { ref part, .. }) if part.contains(what) => {}
+        other => panic!("{what}: {other:?}"),
+    }
+}
+
+#[test]
+fn parts_without_derivative_are_refused_when_recording_begins() {
+    let refused = |builder: SimulationBuilder<'static, f64>, what: &str| {
+        assert_refused(builder.build().unwrap().record(), what);
+    };
+    refused(builder(system([1.0, 0.0, 1.0])).constraint(floor()), "dofs without mass");
+    refused(builder(system([1.0; 3])).constraint(floor()).corrector(ZeroAcceleration), "the corrector");
+    refused(builder(system([1.0; 3])).constraint(floor()).linear_solver(Lu), "unsymmetric");
+    let ball = Sphere::new([0.0, 0.0, -2.0], 1.0, Side::Outside).unwrap();
+    let nodes = NodesOnObstacle::new(ball, &[[0.3, 0.0, 0.0]], &[[0, 1, 2]], &[0]).unwrap();
+    refused(builder(system([1.0; 3])).constraint(nodes), "rows that follow u");
+    let pressed = LinearRows::new().row(ContactLaw::Penalty { stiffness: 10.0 }, &[(0, 1.0)], -0.1);
+    refused(builder(system([1.0; 3])).constraint(pressed), "a force at the start");
+    let mut begun = builder(system([1.0; 3])).build().unwrap();
+    begun.step().unwrap();
+    assert_refused(begun.record(), "a run that has begun");
+    assert_refused(gradient(&mut begun), "the gradient");
+}
+
+#[test]
+fn events_without_derivative_are_refused_by_the_gradient() {
+    let law = ContactLaw::AugmentedLagrangian { stiffness: 1e3, augmentations: 3 };
+    let mut run = builder(system([1.0; 3])).constraint(LinearRows::new().row(law, &[(0, 1.0)], 0.05)).build().unwrap();
+    run.record().unwrap();
+    run.run_until(0.04, &mut ()).unwrap();
+    assert!(gradient(&mut run).is_ok(), "it has not touched yet");
+    run.run_until(0.1, &mut ()).unwrap();
+    assert_refused(gradient(&mut run), "this contact law");
+
+    let mut run = builder(system([1.0; 3])).constraint(floor()).build().unwrap();
+    run.record().unwrap();
+    run.run_until(0.1, &mut ()).unwrap();
+    assert!(gradient(&mut run).is_ok());
+    run.set_step_size(0.005).unwrap();
+    assert_refused(gradient(&mut run), "a change of the step size");
+
+    let mut run = builder(system([1.0; 3])).constraint(floor()).build().unwrap();
+    run.record().unwrap();
+    run.restart().unwrap();
+    assert_refused(gradient(&mut run), "a restart");
+}
