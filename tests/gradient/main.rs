@@ -1,7 +1,6 @@
 //! Gradients of runs: against differences of whole runs, and against closed forms.
 
 mod closed_forms;
-mod compare;
 mod refused;
 mod scenes;
 mod throw;

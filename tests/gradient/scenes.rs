@@ -1,6 +1,5 @@
 //! Bodies with many contacts, large strains, supports, and steps that change.
 
-use crate::compare::{AT, assert_equal, compare, objective};
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::gradient::Scales;
@@ -8,6 +7,7 @@ use contact_dynamics::{
     Bathe, CdLagrange, Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Result,
     Simulation, StepControl, TimeIntegrator,
 };
+use contact_dynamics_scenes::gradients::{AT, assert_equal, compare, objective};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
 

@@ -1,11 +1,11 @@
 //! A bar is thrown at a wall, by every scheme.
 
-use crate::compare::{assert_equal, compare};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::verify::GradientError;
 use contact_dynamics::{
     ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Result, Simulation, TimeIntegrator,
 };
+use contact_dynamics_scenes::gradients::{assert_equal, compare};
 use contact_dynamics_scenes::schemes;
 
 /// A bar of ten elements with a load on its far end, thrown at a wall.

@@ -12,6 +12,7 @@ pub mod falls;
 pub mod folding;
 pub mod frames;
 pub mod front;
+pub mod gradients;
 pub mod ground;
 pub mod hertz;
 pub mod hosts;

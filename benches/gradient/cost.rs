@@ -1,6 +1,4 @@
 //! Cost of a gradient beside the run that it belongs to: recorded steps, steps back, and steps back by checkpoints.
-//!
-//! `cargo bench --bench gradient -- [elements a side]…` (default 10 and 20)
 
 use contact_dynamics::contact::Plane;
 use contact_dynamics::gradient::{RecordedStep, Scales, Seed};
@@ -13,8 +11,8 @@ use std::time::Instant;
 
 type Build = Box<dyn Fn() -> Result<Simulation<'static, f64>>>;
 
-fn main() -> Result<()> {
-    let arguments = Arguments::read(&[10, 20], &[3]);
+/// Measures two bars, and blocks of so many elements a side.
+pub(crate) fn measure(arguments: &Arguments) -> Result<()> {
     println!("ratios to a step that is not recorded; a step back includes derivatives by M, C, K and F");
     println!(
         "{:<30} {:>7} {:>6} {:>6} {:>9} {:>9} {:>7} {:>12}",
@@ -30,7 +28,7 @@ fn main() -> Result<()> {
         };
         row(&format!("two bars of {elements}"), &(Box::new(build) as Build), (3 * elements, samples))?;
     }
-    for cells in arguments.sizes {
+    for &cells in &arguments.sizes {
         row(&format!("block of {cells}³ on a plane"), &block(cells, None), (40, samples))?;
         if cells <= 10 {
             row("the same, St. Venant–Kirchhoff", &block(cells, Some(Law::StVenantKirchhoff)), (20, samples))?;
