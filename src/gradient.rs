@@ -5,7 +5,7 @@
 //! - `support`: which runs are recorded; [`Simulation::record`] begins, [`Simulation::gradient`] goes back.
 //! - `backward`: from the last step to the first; `stage`: the transpose of a stage, `changes`: of its corrections,
 //!   `start`: of the state at the start; `conditions`: of contact conditions, `products`: products with K and C,
-//!   `replay`: steps taken again from checkpoints.
+//!   `turning`: rows that turn, `replay`: steps taken again from checkpoints.
 
 mod backward;
 mod changes;
@@ -17,6 +17,7 @@ mod replay;
 mod stage;
 mod start;
 mod support;
+mod turning;
 
 pub use objective::{Objective, RecordedStep, Seed};
 pub use parameters::{Balance, CompliantContact, Parameters, Scales};
@@ -58,15 +59,16 @@ impl<T: Real> Simulation<'_, T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] names the part that has no derivative here: rows that turn (curved obstacles, meshes that
-    /// slide on each other), dofs without mass, ranks, correctors other than
-    /// [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices, forces along a path,
-    /// nonlinear damping with a correction, at the start a force of a compliant law or friction that slides in space;
-    /// and a run that has taken steps.
+    /// [`Error::Incompatible`] names the part that has no derivative here: dofs without mass, ranks, correctors other
+    /// than [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices, forces along a path,
+    /// nonlinear damping with a correction, rows that turn (curved obstacles, meshes that slide on each other) with a
+    /// scheme that imposes contact on velocities, at the start a force of a compliant law or friction that slides in
+    /// space; and a run that has taken steps.
     ///
     /// [`gradient`](Self::gradient) refuses what occurred in the run: forces under other [laws](crate::ContactLaw) than
     /// `Rigid`, `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, changes of the step size if the
-    /// scheme reads more than u, v and a of the last state, restarts, and damping that a step does not resolve.
+    /// scheme reads more than u, v and a of the last state, restarts, damping that a step does not resolve, and along rows
+    /// that turn friction, damped laws and projections of the past.
     pub fn record(&mut self) -> Result<()> {
         self.check_sound()?;
         let past = support::check(self)?;

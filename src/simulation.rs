@@ -17,6 +17,7 @@ pub use build::builder::SimulationBuilder;
 pub(crate) use build::program::{CompiledStage, Program};
 pub(crate) use operator::Operator;
 pub(crate) use operator::tangent::At;
+pub(crate) use rows::constraints::Constraints;
 pub(crate) use rows::slip::{Source as SlipSource, source as slip_source};
 pub(crate) use run::Parts;
 pub use run::Simulation;

@@ -1,8 +1,8 @@
 //! Gradients beside differences of whole runs, in scenes of several kinds.
 
-use contact_dynamics::contact::Plane;
+use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, GeneralizedAlpha, LinearRows, Newmark, NodesOnObstacle, Result, Simulation,
+    Bathe, CdLagrange, Composite, Error, GeneralizedAlpha, LinearRows, Newmark, NodesOnObstacle, Result, Simulation,
     TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
@@ -27,12 +27,13 @@ const SCHEMES: [(&str, Scheme); 5] = [
 /// A scene: its name, the size of its gaps, the end of its runs, and its builder by scheme and factors.
 type Scene = (&'static str, f64, f64, fn(Scheme, &[f64]) -> Result<Simulation<'static, f64>>);
 
-const SCENES: [Scene; 5] = [
+const SCENES: [Scene; 6] = [
     ("two bars", 0.01, 0.35, bars),
     ("bar on a wall", 5.0, 3.3, wall),
     ("frames that pound", 0.01, 3.0, frames),
     ("StVK block on a plane", 0.1, 0.3, soft_block),
     ("block that slides", 0.1, 0.3, sliding_block),
+    ("block on a ball", 0.1, 0.3, block_on_ball),
 ];
 
 /// Prints the largest relative errors.
@@ -126,6 +127,14 @@ fn soft_block(scheme: Scheme, at: &[f64]) -> Result<Simulation<'static, f64>> {
 
 fn sliding_block(scheme: Scheme, at: &[f64]) -> Result<Simulation<'static, f64>> {
     let (solid, contact) = block(at, 0.1)?;
+    let builder = Simulation::builder(solid.system(), scheme(), 0.003);
+    builder.velocity(solid.uniform([0.31 * at[4], -at[4]])).constraint(contact).build()
+}
+
+fn block_on_ball(scheme: Scheme, at: &[f64]) -> Result<Simulation<'static, f64>> {
+    let (solid, _) = block(at, 0.0)?;
+    let ball = Sphere::new([0.6, -0.5231], 0.5 - at[7], Side::Outside)?;
+    let contact = NodesOnObstacle::new(ball, &solid.nodes, &solid.node_dofs(), &solid.surface_nodes())?;
     let builder = Simulation::builder(solid.system(), scheme(), 0.003);
     builder.velocity(solid.uniform([0.31 * at[4], -at[4]])).constraint(contact).build()
 }

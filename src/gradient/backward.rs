@@ -3,6 +3,7 @@
 use super::changes::ChangesBack;
 use super::products::Tangents;
 use super::stage::StageBack;
+use super::turning::Turning;
 use super::{Gradient, Objective, Parameters, RecordedStep, Seed, replay, start};
 use crate::contact::{ContactId, ContactJacobian};
 use crate::corrector::JumpProjection;
@@ -109,13 +110,13 @@ pub(super) fn run_backward<T: Real>(
     let states = (0..=run.scheme.slots()).map(|_| Motion::zero(dofs)).collect();
     let mut way = Way { objective, value: T::zero(), steps: tape.len(), states, starter: None };
     match &tape.checkpoints {
-        None => way.steps_back(run, &mut back, (&tape.steps, 0))?,
+        None => way.steps_back(run, &mut back, (&tape.steps, 0), &tape.start)?,
         Some(Checkpoints { list, every, sizes }) => {
             for (number, from) in list.iter().enumerate().rev() {
                 let first = number * every;
                 let sizes = &sizes[first..sizes.len().min(first + every)];
                 let segment = replay::take_again(run, tape, from, sizes)?;
-                way.steps_back(run, &mut back, (&segment.steps, first))?;
+                way.steps_back(run, &mut back, (&segment.steps, first), &from.0)?;
             }
         }
     }
@@ -148,12 +149,13 @@ struct Way<'w, T: Real> {
 }
 
 impl<T: Real> Way<'_, T> {
-    /// Goes back through some steps, the first of which has the number `first` + 1.
+    /// Goes back through some steps, the first of which has the number `first` + 1 and starts from a state.
     fn steps_back(
         &mut self,
         run: &mut Simulation<'_, T>,
         back: &mut Back<'_, T>,
         (steps, first): (&[StepRecord<T>], usize),
+        start: &State<T>,
     ) -> Result<()> {
         for (place, step) in steps.iter().enumerate().rev() {
             let mut seeds = self.seed((first + place + 1, step.h), &step.state, back);
@@ -165,7 +167,8 @@ impl<T: Real> Way<'_, T> {
                 }
             }
             back.give(seeds.rates.iter_mut().map(std::mem::take));
-            step_back((run, &mut self.starter), back, step, &seeds, &mut self.states)?;
+            let from = place.checked_sub(1).map_or(start, |before| &steps[before].state);
+            step_back((run, &mut self.starter), back, (from, step), &seeds, &mut self.states)?;
         }
         Ok(())
     }
@@ -200,7 +203,7 @@ fn rate_shares<T: Real>(shifts: &[f64; 2], extrapolates: bool) -> [[T; 2]; 2] {
 fn step_back<T: Real>(
     (run, starter): (&mut Simulation<'_, T>, &mut Option<Program<T>>),
     back: &mut Back<'_, T>,
-    step: &StepRecord<T>,
+    (from, step): (&State<T>, &StepRecord<T>),
     seeds: &Seeds<T>,
     states: &mut Vec<Motion<T>>,
 ) -> Result<()> {
@@ -215,14 +218,18 @@ fn step_back<T: Real>(
         states.insert(1, back.zero_motion(dofs));
     }
     let no_force = back.zeros(rows);
-    let Simulation { parts, compiled, work, .. } = run;
+    let turns = !run.constraints.is_affine() && step.stages.iter().any(|stage| !stage.held.is_empty());
+    if turns {
+        // The candidates of the step.
+        run.constraints.search(&from.motion, run.scheme.ahead() * step.h, &mut run.g)?;
+    }
+    let Simulation { parts, compiled, work, constraints, g, .. } = run;
     let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);
     for (place, (stage, record)) in program.stages.iter().zip(&step.stages).enumerate().rev() {
         let mut new = states.remove(0);
         let force = if place + 1 == count { &seeds.force } else { &no_force };
         let operator = &mut program.operators[stage.operator];
-        let version = back.follow(&record.rows);
-        operator.follow(version);
+        back.follow(&record.rows);
         let system = &mut *parts.system;
         let Motion { t, u, v, .. } = &record.balance;
         back.tangents.evaluate(system, (*t, u, v))?;
@@ -230,11 +237,14 @@ fn step_back<T: Real>(
             operator.factorize(system, step.h, At::state(&record.balance))?;
             back.factorized = None;
         }
-        let mut changes = ChangesBack { system, operator, stage, h: step.h, contacts: &step.state.contacts, back };
+        let turning = turns.then_some(Turning { constraints: &mut *constraints, g: &mut *g, h: step.h });
+        let mut changes = ChangesBack { system, operator, stage, h: step.h, step, turning, back };
         let raw = changes.undo(record, (force, &seeds.impulse), &mut new, states)?;
         back.hold(&mut new);
+        let turning = turns.then_some(Turning { constraints: &mut *constraints, g: &mut *g, h: step.h });
+        operator.follow(back.follow(&record.forces));
         let versions = &mut work.contact.rows.problem.versions;
-        let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, back, versions };
+        let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, turning, back, versions };
         solved.undo((&raw, &seeds.impulse), &mut new, states)?;
         back.give([raw, new.u, new.v, new.a]);
     }

@@ -3,25 +3,28 @@
 use super::Balance;
 use super::backward::Back;
 use super::conditions::{are_closed, released, solve_transposed};
+use super::turning::Turning;
 use crate::contact::ContactJacobian;
 use crate::contact_solver::no_response;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::{CompiledStage, Operator};
-use crate::state::{Change, ContactState, Guide, Motion, Rule, StageRecord};
+use crate::state::{Change, ContactState, Guide, Motion, Rule, StageRecord, StepRecord};
 use crate::system::System;
 
 /// A corrected stage.
-pub(super) struct ChangesBack<'s, 'b, T: Real> {
+pub(super) struct ChangesBack<'s, 'a, 'b, T: Real> {
     pub(super) system: &'s mut dyn System<T>,
     pub(super) operator: &'s mut Operator<T>,
     pub(super) stage: &'s CompiledStage<T>,
     pub(super) h: f64,
-    pub(super) contacts: &'s ContactState<T>,
+    pub(super) step: &'s StepRecord<T>,
+    /// If rows turn.
+    pub(super) turning: Option<Turning<'s, 'a, T>>,
     pub(super) back: &'s mut Back<'b, T>,
 }
 
-impl<T: Real> ChangesBack<'_, '_, T> {
+impl<T: Real> ChangesBack<'_, '_, '_, T> {
     /// From the derivatives by the corrected states to those by the states before the corrections, and by raw
     /// multipliers, which are returned. Force and impulse hold the derivatives by the reported values of the contacts.
     pub(super) fn undo(
@@ -46,15 +49,19 @@ impl<T: Real> ChangesBack<'_, '_, T> {
                 let reported = change.force * force[row] + change.impulse * impulse[row];
                 reported + if guides { totals[row] } else { T::zero() }
             };
-            let psi = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
+            let (psi, w) = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
             let closed = released(&change.rules, &psi);
+            if let Some(turning) = &mut self.turning {
+                turning.undo_change(change, &closed, &w, &self.step.state.motion, new)?;
+            }
+            self.back.give([w]);
             for (k, (&row, rule)) in change.rows.iter().zip(&change.rules).enumerate() {
                 if guides {
                     raw[row] += change.share * totals[row];
                 }
                 match *rule {
                     Rule::Closed if change.field == 0 && !record.rows.is_tangential(row) => {
-                        *self.back.gaps.entry(self.contacts.ids[row]).or_insert(T::zero()) -= closed[k];
+                        *self.back.gaps.entry(self.step.state.contacts.ids[row]).or_insert(T::zero()) -= closed[k];
                     }
                     // A past displacement is moved to that of the state where the contact sticks.
                     Rule::Closed if change.field == 0 => record.rows.scatter(row, closed[k], &mut new.u),
@@ -68,7 +75,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
                     }
                 }
             }
-            let name = |k: usize| self.contacts.ids[self.contacts.tangents.owner(change.rows[k])];
+            let name = |k: usize| self.step.state.contacts.ids[self.step.state.contacts.tangents.owner(change.rows[k])];
             self.back.add_friction(&change.rules, |k| (name(k), psi[k]), |k| change.totals[k]);
         }
         self.back.give([totals]);
@@ -95,7 +102,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         }
     }
 
-    /// Undoes a change in the derivatives `x`; returns ψ of its conditions. `read` are the derivatives by a unit
+    /// Undoes a change in the derivatives `x`; returns ψ of its conditions, and w. `read` are the derivatives by a unit
     /// of the multiplier of a row.
     fn remove(
         &mut self,
@@ -104,7 +111,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         x: &mut [T],
         damped: Option<&Damped<T>>,
         read: impl Fn(usize) -> T,
-    ) -> Result<Vec<T>> {
+    ) -> Result<(Vec<T>, Vec<T>)> {
         let Self { system, back, .. } = self;
         let Change { rows, rules, multipliers, .. } = change;
         // The derivatives by the change itself.
@@ -114,7 +121,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         }
         back.projection.apply_inverse(&mut w)?;
         let mut psi: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + read(row)).collect();
-        back.solve_jumps((g, rows), rules, &mut psi, self.contacts)?;
+        back.solve_jumps((g, rows), rules, &mut psi, &self.step.state.contacts)?;
         let sigma = released(rules, &psi);
         rows.iter().zip(&sigma).for_each(|(&row, &sigma)| g.scatter(row, -sigma, x));
         back.projection.push(g, (rows, &sigma), -T::one(), &mut w)?;
@@ -124,7 +131,7 @@ impl<T: Real> ChangesBack<'_, '_, T> {
         if let Some(damped) = damped {
             self.differentiate_damping(damped, &moved)?;
         }
-        Ok(psi)
+        Ok((psi, w))
     }
 
     /// The derivatives by the parameters in (M, or A h²/w_ā) δa = −C δv.

@@ -16,26 +16,33 @@
 
 use super::backward::Back;
 use super::conditions::{released, solve_transposed};
+use super::turning::{Path, Turning};
 use super::{Balance, CompliantContact};
 use crate::contact_solver::no_response;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::real::Real;
+use crate::rounding::half_digits;
 use crate::simulation::{CompiledStage, Operator, SlipSource, slip_source};
 use crate::state::{Compliance, Held, Motion, Rule, StageRecord};
 use crate::system::System;
 
+/// Largest number of solutions of a stage whose rows turn; each gains about as many digits as the angle is small.
+const ITERATIONS: usize = 40;
+
 /// A solved stage.
-pub(super) struct StageBack<'s, 'b, T: Real> {
+pub(super) struct StageBack<'s, 'a, 'b, T: Real> {
     pub(super) system: &'s mut dyn System<T>,
     pub(super) operator: &'s mut Operator<T>,
     pub(super) stage: &'s CompiledStage<T>,
     pub(super) record: &'s StageRecord<T>,
+    /// If rows turn.
+    pub(super) turning: Option<Turning<'s, 'a, T>>,
     pub(super) back: &'s mut Back<'b, T>,
     /// The number of Delassus operators so far.
     pub(super) versions: &'s mut u64,
 }
 
-impl<T: Real> StageBack<'_, '_, T> {
+impl<T: Real> StageBack<'_, '_, '_, T> {
     /// From the derivatives by the new state, by raw multipliers and by impulses to those by past states, gaps and
     /// parameters.
     pub(super) fn undo(
@@ -51,7 +58,11 @@ impl<T: Real> StageBack<'_, '_, T> {
             T::axpy(weight, new.field(field), &mut w);
         }
         self.back.prescribed.iter().for_each(|&dof| w[dof] = T::zero());
-        let q = self.solve(&read, &mut w)?;
+        let q = if self.turning.is_some() && !record.held.is_empty() {
+            self.solve_turning(&read, &mut w)?
+        } else {
+            self.solve(&read, &mut w)?
+        };
 
         let Self { system, back, .. } = self;
         let Motion { t, u, v, a } = &record.balance;
@@ -61,6 +72,8 @@ impl<T: Real> StageBack<'_, '_, T> {
         back.tangents.add_stiffness(&**system, -T::one(), &w, &mut predicted.u);
         back.tangents.add_damping(&**system, -T::one(), &w, &mut predicted.v);
         system.mass().add_product(-T::one(), &w, &mut predicted.a);
+        self.add_turned_forces(&w, T::one(), &mut predicted.u)?;
+        let record = self.record;
         if !record.held.is_empty() {
             self.undo_conditions(&q, new, &mut predicted, past);
         }
@@ -85,8 +98,8 @@ impl<T: Real> StageBack<'_, '_, T> {
                 }
                 None => record.rows.scatter(held.row, -q, &mut target),
                 Some(Compliance { by_force, lag, law, gap, rate }) => {
-                    record.rows.scatter(held.row, -q, &mut predicted.u);
-                    record.rows.scatter(held.row, -q * lag, &mut predicted.v);
+                    record.forces.scatter(held.row, -q, &mut predicted.u);
+                    record.forces.scatter(held.row, -q * lag, &mut predicted.v);
                     let contact = CompliantContact { id: held.id, law, gap, rate, force: held.force };
                     back.parameters.contact(&contact, q * by_force);
                 }
@@ -110,6 +123,49 @@ impl<T: Real> StageBack<'_, '_, T> {
         back.give([target, slip]);
     }
 
+    /// `out += c ∂(Gᵀ λ)/∂ū w`: forces turn with the rows that they act along.
+    fn add_turned_forces(&mut self, w: &[T], c: T, out: &mut [T]) -> Result<()> {
+        let Self { record, turning, .. } = self;
+        let Some(turning) = turning.as_mut().filter(|_| !record.held.is_empty()) else { return Ok(()) };
+        let (rows, forces): (Vec<usize>, Vec<T>) = record.held.iter().map(|held| (held.row, held.force)).unzip();
+        let path = Path { from: (record.balance.t, &record.balance.u), rates: (0.0, w) };
+        turning.add_first(path, (&rows, &forces), c, out)
+    }
+
+    /// [`solve`](Self::solve) with rows that turn: the matrix has the stiffness of turning forces, and rigid forces act
+    /// along other rows F than those G whose gaps they close,
+    ///
+    /// ```text
+    /// (A − w_ū ∂(Fᵀ λ)/∂ū) w + Gᵀ τ q = d̄          −F w + c q = λ̄
+    /// ```
+    ///
+    /// Both differences are small, and are brought to the right.
+    fn solve_turning(&mut self, read: &[T], d: &mut [T]) -> Result<Vec<T>> {
+        let [by_u, ..] = self.stage.balanced().weights();
+        let (known, record) = (d.to_vec(), self.record);
+        let mut w = vec![T::zero(); d.len()];
+        let mut q = vec![T::zero(); read.len()];
+        for _ in 0..ITERATIONS {
+            d.copy_from_slice(&known);
+            self.add_turned_forces(&w, by_u, d)?;
+            for (held, &q) in record.held.iter().zip(&q).filter(|(held, _)| held.compliance.is_none()) {
+                let multiplier = self.weight(held) * q;
+                record.forces.scatter(held.row, multiplier, d);
+                record.rows.scatter(held.row, -multiplier, d);
+            }
+            self.back.prescribed.iter().for_each(|&dof| d[dof] = T::zero());
+            q = self.solve(read, d)?;
+            let change = d.iter().zip(&w).fold(T::zero(), |most, (&new, &old)| (new - old).abs().max(most));
+            w.copy_from_slice(d);
+            if change <= half_digits::<T>() * T::largest(d) {
+                return Ok(q);
+            }
+        }
+        let (part, reason) =
+            ("the gradient through rows that turn".into(), "they turn too much in a step: choose smaller ones");
+        Err(Error::Incompatible { part, reason })
+    }
+
     /// d̄ becomes w; returns the derivatives by δs: q/τ, or Pᵀ ψ.
     fn solve(&mut self, read: &[T], d: &mut [T]) -> Result<Vec<T>> {
         let size = self.operator.interface();
@@ -123,7 +179,7 @@ impl<T: Real> StageBack<'_, '_, T> {
         let rows: Vec<usize> = solved.iter().map(|&k| held[k].row).collect();
         let mut q = vec![T::zero(); held.len()];
         if !rows.is_empty() {
-            let g = &*self.record.rows;
+            let g = &*self.record.forces;
             let mut multipliers: Vec<T> =
                 solved.iter().map(|&k| read[k] + g.interface_product(held[k].row, &interface)).collect();
             match has_slip {
@@ -144,7 +200,7 @@ impl<T: Real> StageBack<'_, '_, T> {
         self.back.give([interface, response, forces]);
         if !has_slip {
             // c δλ = δs.
-            let g = &*self.record.rows;
+            let g = &*self.record.forces;
             for (k, held) in held.iter().enumerate().filter(|&(k, _)| weights[k] == T::zero()) {
                 q[k] = held.compliance.map_or(T::zero(), |known| (read[k] + g.product(held.row, d)) / known.by_force);
             }
@@ -159,7 +215,7 @@ impl<T: Real> StageBack<'_, '_, T> {
             let known = record.held[solved[k]].compliance;
             known.map_or(T::zero(), |known| known.by_force / weights[solved[k]])
         };
-        let (w, version) = operator.delassus(&record.rows, rows, compliance, versions)?;
+        let (w, version) = operator.delassus(&record.forces, rows, compliance, versions)?;
         if *factorized != Some(version) {
             *factorized = None;
             let size = rows.len();
@@ -175,7 +231,7 @@ impl<T: Real> StageBack<'_, '_, T> {
     /// Solves for ψ of all rows that carried a force; x becomes Pᵀ ψ.
     fn solve_with_friction(&mut self, rows: &[usize], weights: &[T], x: &mut [T]) -> Result<()> {
         let Self { operator, record, back, versions, .. } = self;
-        let (w, _) = operator.delassus(&record.rows, rows, |_| T::zero(), versions)?;
+        let (w, _) = operator.delassus(&record.forces, rows, |_| T::zero(), versions)?;
         let (size, held) = (rows.len(), &record.held);
         let rules: Vec<Rule<T>> = held.iter().map(|held| held.rule).collect();
         let entry = |i: usize, j: usize| weights[i] * w[i * size + j];

@@ -3,10 +3,11 @@
 use super::Balance;
 use super::backward::{Back, Seeds};
 use super::conditions::released;
+use super::turning::Turning;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simulation::Simulation;
-use crate::state::{Motion, Rule, StartingPast, Tape};
+use crate::state::{Change, Motion, Rule, StartingPast, Tape};
 
 /// From the derivatives by the stored states at the start, newest first, and by what the objective reads there, to
 /// those by the initial displacements and velocities.
@@ -39,7 +40,11 @@ pub(super) fn start_back<T: Real>(
     back.prescribed.iter().for_each(|&dof| a[dof] = T::zero());
 
     // M a = f + Gᵀ λ with G a + γ = 0 on the contacts that press.
-    let Simulation { parts, g, .. } = run;
+    let turns = !run.constraints.is_affine();
+    if turns {
+        run.constraints.search(&tape.start.motion, run.scheme.ahead() * h, &mut run.g)?;
+    }
+    let Simulation { parts, constraints, g, .. } = run;
     let contacts = &tape.start.contacts;
     let (mut rows, mut rules) = (Vec::new(), Vec::new());
     for row in (0..contacts.ids.len()).filter(|&row| contacts.lambda[row] != T::zero()) {
@@ -51,19 +56,37 @@ pub(super) fn start_back<T: Real>(
         rules.extend(Rule::of_friction(normal, force, &contacts.lambda[own.clone()], (bound, T::one())));
         rows.extend(own);
     }
-    let mut w = a;
+    let (mut w, mut turned) = (a, None);
     back.projection.apply_inverse(&mut w)?;
     if !rows.is_empty() {
+        // Rows that turn are those of the search above.
         let recorded = tape.steps.first().and_then(|step| step.stages.first()).map(|stage| &stage.rows);
-        let g = recorded.map_or(&*g, |rows| &**rows);
-        if let Some(rows) = recorded {
+        let g = if let Some(rows) = recorded.filter(|_| !turns) {
             back.follow(rows);
-        }
+            rows
+        } else {
+            back.projection.reset();
+            &*g
+        };
         let mut psi: Vec<T> = rows.iter().map(|&row| g.product(row, &w) + force[row]).collect();
         back.solve_jumps((g, &rows), &rules, &mut psi, contacts)?;
         let name = |k: usize| contacts.ids[contacts.tangents.owner(rows[k])];
         back.add_friction(&rules, |k| (name(k), psi[k]), |k| contacts.lambda[rows[k]]);
-        back.projection.push(g, (&rows, &released(&rules, &psi)), -T::one(), &mut w)?;
+        let closed = released(&rules, &psi);
+        back.projection.push(g, (&rows, &closed), -T::one(), &mut w)?;
+        turned = turns.then_some((rows, closed));
+    }
+    if let Some((rows, closed)) = turned {
+        let forces = rows.iter().map(|&row| contacts.lambda[row]).collect();
+        let change = Change::of_accelerations(rows, forces);
+        let solved = Motion {
+            v: tape.start.velocity().to_vec(),
+            a: tape.start.acceleration().to_vec(),
+            ..tape.start.motion.clone()
+        };
+        let mut new = Motion { t: solved.t, u, v, a: Vec::new() };
+        Turning { constraints, g, h }.undo_change(&change, &closed, &w, &solved, &mut new)?;
+        (u, v) = (new.u, new.v);
     }
     let (system, start) = (&mut *parts.system, &tape.start);
     let (t, displacement) = (start.time(), start.displacement());

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::simulation::{Operator, Simulation};
+use crate::simulation::{CompiledStage, Operator, Simulation};
 use crate::state::{StartingPast, slides};
 use crate::system::Linearity;
 
@@ -24,10 +24,12 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
             return refuse(format!("the corrector {}", corrector.name()), reason);
         }
     }
-    if !run.constraints.is_affine() {
+    let at_velocities =
+        |stage: &CompiledStage<T>| stage.contact.as_ref().is_some_and(|contact| contact.forecast.is_some());
+    if !run.constraints.is_affine() && run.compiled.program.stages.iter().any(at_velocities) {
         let reason =
-            "the derivative of rows that turn is not implemented: choose obstacles and gaps that are linear in u";
-        return refuse("rows that follow u".into(), reason);
+            "the scheme imposes contact on velocities, along the rows of the last search: choose another scheme";
+        return refuse("rows that turn".into(), reason);
     }
     let nonlinear = run.parts.system.linearity() == Linearity::Nonlinear;
     let damped = run.parts.system.damping_force().is_some();

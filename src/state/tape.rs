@@ -91,7 +91,9 @@ pub(crate) struct StepRecord<T> {
 pub(crate) struct StageRecord<T> {
     /// The motion at which the balance holds.
     pub(crate) balance: Motion<T>,
+    /// The rows where contact is imposed, and those along which forces act where the balance holds.
     pub(crate) rows: Arc<ContactJacobian<T>>,
+    pub(crate) forces: Arc<ContactJacobian<T>>,
     /// The rows that carried a force in the solution.
     pub(crate) held: Vec<Held<T>>,
     /// Impulse of a unit multiplier.
@@ -216,6 +218,24 @@ pub(crate) struct Change<T> {
     pub(crate) impulse: T,
     /// Whether damping forces follow.
     pub(crate) damps: bool,
+}
+
+impl<T: Real> Change<T> {
+    /// Forces along closed rows.
+    pub(crate) fn of_accelerations(rows: Vec<usize>, multipliers: Vec<T>) -> Self {
+        Self {
+            state: 0,
+            field: 2,
+            rules: vec![Rule::Closed; rows.len()],
+            totals: multipliers.clone(),
+            rows,
+            multipliers,
+            share: T::zero(),
+            force: T::zero(),
+            impulse: T::zero(),
+            damps: false,
+        }
+    }
 }
 
 /// The changes of a stage, as corrections make them.

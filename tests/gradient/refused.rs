@@ -5,8 +5,8 @@ use contact_dynamics::corrector::ZeroAcceleration;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::gradient::{Gradient, RecordedStep, Seed};
 use contact_dynamics::{
-    ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Lu, NodesOnObstacle, Result, Simulation,
-    SimulationBuilder,
+    CdLagrange, Composite, ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Lu, Newmark, NodesOnObstacle,
+    Result, Simulation, SimulationBuilder, TimeIntegrator,
 };
 
 fn zero(_: &RecordedStep<'_, f64>, _: &mut Seed<'_, f64>) -> f64 {
@@ -31,6 +31,12 @@ fn floor() -> LinearRows<'static, f64> {
     LinearRows::new().unilateral(&[(0, 1.0)], 0.05)
 }
 
+/// A ball of radius 1 below a node.
+fn ball(friction: f64) -> NodesOnObstacle<'static, f64, 3> {
+    let ball = Sphere::new([0.0, 0.0, -1.1], 1.0, Side::Outside).unwrap();
+    NodesOnObstacle::new(ball, &[[0.3, 0.0, 0.0]], &[[0, 1, 2]], &[0]).unwrap().friction(friction)
+}
+
 fn assert_refused<R: std::fmt::Debug>(result: Result<R>, what: &str) {
     match result {
         Err(Error::Incompatible { ref part, .. }) if part.contains(what) => {}
@@ -46,9 +52,8 @@ fn parts_without_derivative_are_refused_when_recording_begins() {
     refused(builder(system([1.0, 0.0, 1.0])).constraint(floor()), "dofs without mass");
     refused(builder(system([1.0; 3])).constraint(floor()).corrector(ZeroAcceleration), "the corrector");
     refused(builder(system([1.0; 3])).constraint(floor()).linear_solver(Lu), "unsymmetric");
-    let ball = Sphere::new([0.0, 0.0, -2.0], 1.0, Side::Outside).unwrap();
-    let nodes = NodesOnObstacle::new(ball, &[[0.3, 0.0, 0.0]], &[[0, 1, 2]], &[0]).unwrap();
-    refused(builder(system([1.0; 3])).constraint(nodes), "rows that follow u");
+    let explicit = Simulation::builder(system([1.0; 3]), CdLagrange, 0.01);
+    refused(explicit.constraint(ball(0.0)), "rows that turn");
     let pressed = LinearRows::new().row(ContactLaw::Penalty { stiffness: 10.0 }, &[(0, 1.0)], -0.1);
     refused(builder(system([1.0; 3])).constraint(pressed), "a force at the start");
     let mut begun = builder(system([1.0; 3])).build().unwrap();
@@ -73,6 +78,17 @@ fn events_without_derivative_are_refused_by_the_gradient() {
     assert!(gradient(&mut run).is_ok());
     run.set_step_size(0.005).unwrap();
     assert_refused(gradient(&mut run), "a change of the step size");
+
+    for (what, friction, scheme) in [
+        ("friction along rows that turn", 0.2, Box::new(Newmark::trapezoidal()) as Box<dyn TimeIntegrator>),
+        ("a projected past along rows that turn", 0.0, Box::new(Composite)),
+    ] {
+        let falls = Simulation::builder(system([1.0; 3]), scheme, 0.01).velocity(vec![0.0, 0.0, -1.0]);
+        let mut run = falls.constraint(ball(friction)).build().unwrap();
+        run.record().unwrap();
+        run.run_until(0.3, &mut ()).unwrap();
+        assert_refused(gradient(&mut run), what);
+    }
 
     let mut run = builder(system([1.0; 3])).constraint(floor()).build().unwrap();
     run.record().unwrap();

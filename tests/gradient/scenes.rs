@@ -1,13 +1,13 @@
 //! Bodies with many contacts, large strains, supports, and steps that change.
 
-use contact_dynamics::contact::Plane;
+use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::gradient::Scales;
 use contact_dynamics::{
-    Bathe, CdLagrange, Composite, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Result,
-    Simulation, StepControl, TimeIntegrator,
+    Bathe, CdLagrange, Composite, ContactLaw, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
+    Result, Simulation, StepControl, TimeIntegrator,
 };
-use contact_dynamics_scenes::gradients::{AT, assert_equal, compare, objective};
+use contact_dynamics_scenes::gradients::{AT, assert_equal, assert_near, compare, objective};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
 
@@ -208,5 +208,61 @@ fn friction_in_space() {
         };
         let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
         assert_equal(&error, &schemes()[number].name());
+    }
+}
+
+/// A block lands on a ball: rows turn.
+#[test]
+fn rows_that_turn() {
+    let one_step: [fn() -> Box<dyn TimeIntegrator>; 3] = [
+        || Box::new(Newmark::trapezoidal()),
+        || Box::new(GeneralizedAlpha::default()),
+        || Box::new(Newmark::new(0.3, 0.6).unwrap()),
+    ];
+    for scheme in one_step {
+        for law in [ContactLaw::Rigid, ContactLaw::Penalty { stiffness: 50.0 }] {
+            let build = |at: &[f64]| {
+                let solid = block(at);
+                let ball = Sphere::new([0.6, -0.5231], 0.5 - at[7], Side::Outside)?;
+                let surface = solid.surface_nodes();
+                let contact = NodesOnObstacle::new(ball, &solid.nodes, &solid.node_dofs(), &surface)?;
+                let law = match law {
+                    ContactLaw::Penalty { stiffness } => ContactLaw::Penalty { stiffness: stiffness * at[5] },
+                    other => other,
+                };
+                Simulation::builder(solid.system(), scheme(), 0.003)
+                    .velocity(solid.uniform([0.31 * at[4], -at[4]]))
+                    .constraint(contact.with_law(law))
+                    .build()
+            };
+            let error = compare(&build, &|run| run.run_until(0.3, &mut ()).map(drop), (8, 0.1)).unwrap();
+            // Steps iterate rows that turn until forces agree to about 1e-7.
+            assert_near(&error, 1e-5, &format!("{law:?}, {}", scheme().name()));
+        }
+    }
+}
+
+/// A mass slides in a bowl from the start on, and the bowl swings.
+#[test]
+fn a_mass_in_a_bowl() {
+    for swing in [0.0, 0.3] {
+        for scheme in [|| Newmark::trapezoidal(), || Newmark::new(0.3, 0.6).unwrap()] {
+            let build = |at: &[f64]| {
+                let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &[]).unwrap();
+                let factor = at[3];
+                let system = LinearSystem::lumped(vec![2.0 * at[0]; 2], stiffness)?;
+                let system = system.load(move |_, f| [f[0], f[1]] = [0.0, -20.0 * factor]);
+                let bowl = Sphere::new([0.0, 0.0], 1.0, Side::Inside)?;
+                let (s, c) = 0.4_f64.sin_cos();
+                let contact = NodesOnObstacle::new(bowl, &[[s, -c]], &[[0, 1]], &[0])?.moving(move |t| {
+                    let (x, v, a) = (swing * t * t * t, 3.0 * swing * t * t, 6.0 * swing * t);
+                    [[x, 0.0], [v, 0.0], [a, 0.0]]
+                });
+                let velocity = vec![-0.7 * c * at[4], -0.7 * s * at[4]];
+                Simulation::builder(system, scheme(), 0.004).velocity(velocity).constraint(contact).build()
+            };
+            let error = compare(&build, &|run| run.run_until(0.5, &mut ()).map(drop), (5, 0.1)).unwrap();
+            assert_equal(&error, &format!("{swing}, {}", scheme().name()));
+        }
     }
 }

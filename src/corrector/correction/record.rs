@@ -33,6 +33,11 @@ impl<T: Real> Correction<'_, T> {
 
     /// Records that a field of past state k is projected, with the impulse of a unit multiplier.
     pub(super) fn record_past(&mut self, k: usize, field: usize, impulse: T) {
+        if self.constraints.0.turn() {
+            let reason =
+                "the derivative of its projection is not implemented: choose a scheme that reads no past state";
+            self.refuse_gradient("a projected past along rows that turn", reason);
+        }
         if self.buffers.changes.is_some() {
             let change = Change { impulse, ..self.solution(k, field) };
             self.buffers.changes.iter_mut().for_each(|changes| changes.list.push(change.clone()));

@@ -8,6 +8,7 @@ use crate::rounding::half_digits;
 use crate::simulation::rows::slip::{Source, source};
 use crate::simulation::stage::StageSolve;
 use crate::state::{Compliance, Held, Motion, Rule, StageRecord, Tape};
+use std::sync::Arc;
 
 impl<T: Real> StageSolve<'_, '_, T> {
     /// Records a solved stage before corrections; its solution is d, or the increment. `impulse` is the impulse of a unit
@@ -38,6 +39,9 @@ impl<T: Real> StageSolve<'_, '_, T> {
                     continue;
                 }
             };
+            if compliance.is_some_and(|known: Compliance<T>| known.lag != T::zero()) && !self.constraints.is_affine() {
+                tape.refuse("damped contact along rows that turn", "its derivative is not implemented");
+            }
             let id = self.constraints.ids[row];
             let (normal, rule) = (held.len(), Rule::Closed);
             held.push(Held { row, id, rule, force, is_slip: false, compliance });
@@ -49,7 +53,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
         }
         let rows = tape.rows(self.g, self.constraints.version());
-        tape.stages.push(StageRecord { balance, rows, held, impulse, changes: Vec::new() });
+        let curved = &self.contact.rows.curved;
+        let forces = if curved.apart { Arc::new(curved.forces(self.g).clone()) } else { Arc::clone(&rows) };
+        if !self.constraints.is_affine() && held.iter().any(|held: &Held<T>| held.is_slip) {
+            tape.refuse("friction along rows that turn", "its derivative is not implemented");
+        }
+        tape.stages.push(StageRecord { balance, rows, forces, held, impulse, changes: Vec::new() });
         Ok(())
     }
 
@@ -98,7 +107,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
 fn compliance<T: Real>(law: ContactLaw, [gap, rate]: [T; 2], force: T) -> Compliance<T> {
     let known = Compliance { by_force: T::zero(), lag: T::zero(), law, gap, rate };
     // A dashpot that begins to press bears a part of its force at a gap of zero: it is rigid then.
-    if (law.force(gap, -rate) - force).abs() > half_digits::<T>() * force {
+    let begins = (law.force(gap, -rate) - force).abs() > half_digits::<T>().sqrt() * force;
+    if begins && matches!(law, ContactLaw::KelvinVoigt { .. }) {
         return known;
     }
     let [by_depth, by_rate] = law.slopes(force.value(), -gap.value()).map(T::of);

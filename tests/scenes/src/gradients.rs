@@ -81,10 +81,19 @@ pub fn largest_error(error: &GradientError) -> f64 {
 ///
 /// If they differ.
 pub fn assert_equal(error: &GradientError, what: &str) {
+    assert_near(error, 1e-6, what);
+}
+
+/// [`assert_equal`] with another tolerance.
+///
+/// # Panics
+///
+/// If they differ.
+pub fn assert_near(error: &GradientError, tolerance: f64, what: &str) {
     let largest = error.expected.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
     for (k, (spread, expected)) in error.spread.iter().zip(&error.expected).enumerate() {
         let is_smooth = *spread < 1e-3 || expected.abs() < 1e-8 * largest;
         assert!(is_smooth, "{what}: a kink lies near, by {}: {error:?}", NAMES[k]);
     }
-    assert!(largest_error(error) < 1e-6, "{what}, by {}: {error:?}", NAMES[error.parameter]);
+    assert!(largest_error(error) < tolerance, "{what}, by {}: {error:?}", NAMES[error.parameter]);
 }
