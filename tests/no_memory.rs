@@ -39,7 +39,8 @@ impl Scene {
         let cells = match self {
             Self::Newton => [8, 8, 6],
             Self::Lu => [10, 10, 4],
-            _ => [14, 14, 10],
+            Self::Explicit | Self::Consistent => [14, 14, 10],
+            _ => [12, 12, 8],
         };
         let solid = Solid::block([1.0, 1.0, 0.7], cells, MATERIAL);
         let solver: Box<dyn LinearSolver<f64>> = match self {

@@ -53,8 +53,8 @@ fn bounce(make: Make, n: u32, phase: f64, with: With) -> [f64; 2] {
 #[test]
 fn runs_end_with_the_energy_that_release_gives_back() {
     for (make, conserves) in schemes() {
-        for n in [20, 50, 100] {
-            for phase in (0..10).map(|i| 0.05 + 0.1 * f64::from(i)) {
+        for (n, every) in [(20, 1), (50, 1), (100, 3)] {
+            for phase in (0..10).step_by(every).map(|i| 0.05 + 0.1 * f64::from(i)) {
                 let [without, taken] = bounce(make, n, phase, With::Nothing);
                 let [found, _] = bounce(make, n, phase, With::Release);
                 let case = format!("{}, n = {n}, phase {phase}: {found} after {without}, taken {taken}", make().name());

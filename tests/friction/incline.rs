@@ -79,7 +79,7 @@ fn below_the_angle_of_friction_nothing_creeps() {
     }
     for scheme in [Box::new(Newmark::trapezoidal()) as Box<dyn TimeIntegrator>, Box::new(CdLagrange)] {
         let mut run = incline(scheme, 2.0, [0.2, 0.25], 0.0, 0.01).unwrap();
-        for _ in 0..1_000_000 {
+        for _ in 0..100_000 {
             run.step().unwrap();
         }
         assert_eq!(run.state().displacement()[0].to_bits(), START.to_bits());

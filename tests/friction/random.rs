@@ -94,12 +94,12 @@ fn growth_with(
 /// with. (Two tests, for two cores.)
 #[test]
 fn scenes_by_chance_of_generalized_alpha() {
-    assert!(largest_growth(|| Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap()), 1..5000) < 1e-12);
+    assert!(largest_growth(|| Box::new(GeneralizedAlpha::chung_hulbert(0.5).unwrap()), 1..3000) < 1e-12);
 }
 
 #[test]
 fn scenes_by_chance_of_bdf2() {
-    assert!(largest_growth(|| Box::new(Bdf2), 1..5000) < 1e-12);
+    assert!(largest_growth(|| Box::new(Bdf2), 1..3000) < 1e-12);
 }
 
 #[test]

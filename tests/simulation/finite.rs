@@ -250,27 +250,31 @@ fn a_host_that_fails_once_costs_a_step_and_nothing_else() {
         };
         let quiet = Fault { part: Part::Force, value: 0.0, left: Arc::new(AtomicUsize::new(DISARMED)) };
         let mut clean = build(&quiet).build().unwrap();
-        let mut touched = [false; 3];
+        let (mut touched, mut traces) = ([false; 3], Vec::new());
         for _ in 0..STEPS {
+            traces.push(trace(&clean));
             clean.step().unwrap();
             clean.state().contacts().closed().iter().zip(&mut touched).for_each(|(closed, touched)| *touched |= closed);
         }
         assert!(touched.iter().filter(|touched| **touched).count() >= 2, "{index}: {touched:?}");
         let expected = (trace(&clean), clean.energy());
-        let mut failures = 0;
+        let (mut failures, mut random) = (0, xorshift(index as u64 + 1));
         for part in PARTS {
+            // The first calls, and a third of the others, by chance: the same places of a step come again in each.
             for call in 1.. {
-                let value = if call % 3 == 0 { f64::INFINITY } else { f64::NAN };
+                if call > 12 && random() > 1.0 / 3.0 {
+                    continue;
+                }
+                let value = if random() < 0.3 { f64::INFINITY } else { f64::NAN };
                 let fault = Fault { part, value, left: Arc::new(AtomicUsize::new(DISARMED)) };
                 let mut run = build(&fault).build().unwrap();
                 fault.arm(call);
                 let case = format!("run {index}, {part:?} {value} at call {call}");
-                for step in 0..STEPS {
-                    let before = trace(&run);
+                for (step, before) in traces.iter().enumerate() {
                     if let Err(error) = run.step() {
                         failures += 1;
                         assert!(fault.is_past(), "{case}, step {step}: {error}");
-                        assert_eq!(before, trace(&run), "{case}, step {step}: {error}");
+                        assert_eq!(*before, trace(&run), "{case}, step {step}: {error}");
                         run.step().unwrap_or_else(|error| panic!("{case}, step {step} again: {error}"));
                     }
                     assert!(is_finite(&run), "{case}, step {step}: {}", trace(&run));
@@ -282,7 +286,7 @@ fn a_host_that_fails_once_costs_a_step_and_nothing_else() {
                 }
             }
         }
-        assert!(failures > 300, "{index}: {failures}");
+        assert!(failures > 150, "{index}: {failures}");
     }
 }
 

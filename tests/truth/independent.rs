@@ -21,6 +21,7 @@ use contact_dynamics::tableau::{Stage, Tableau};
 use contact_dynamics::{Newmark, TimeIntegrator};
 use contact_dynamics_scenes::combinations::Correction;
 use history::Reads;
+use std::rc::Rc;
 
 /// One state.
 #[derive(Clone, Debug)]
@@ -51,7 +52,10 @@ pub(crate) struct Contacts {
 pub(crate) struct Truth {
     /// With the present step size.
     scene: Scene,
-    tableau: Tableau,
+    tableau: Rc<Tableau>,
+    /// How many states it reads, and what later rows read after each of its stages.
+    depth: usize,
+    reads: Rc<[Reads]>,
     correction: Correction,
     /// The states that are known, the newest first.
     past: Vec<Motion>,
@@ -89,8 +93,22 @@ impl Truth {
         let tableau = scheme.tableau();
         let (past, contacts) = start::begin(scene, &tableau, correction);
         let slopes = past[0].v.clone();
+        let depth = history::depth(&tableau);
+        let reads = (0..tableau.stages.len()).map(|s| history::reads_after(&tableau, s)).collect();
         let (scene, made_with) = (scene.clone(), scene.h);
-        Self { scene, tableau, correction, past, contacts, slopes, made_with, since: 0.0, steps: 0 }
+        Self {
+            scene,
+            tableau: Rc::new(tableau),
+            depth,
+            reads,
+            correction,
+            past,
+            contacts,
+            slopes,
+            made_with,
+            since: 0.0,
+            steps: 0,
+        }
     }
 
     /// Changes the size of later steps, of schemes that read no past and store all at the time of the state.
@@ -110,26 +128,23 @@ impl Truth {
 
     /// One step.
     pub(crate) fn step(&mut self) {
-        let depth = history::depth(&self.tableau);
-        let starts = self.past.len() < depth;
+        let starts = self.past.len() < self.depth;
         // The trapezoidal rule makes the past that a multistep scheme needs. What is edited, and what damping does, is
         // already that of the scheme itself.
-        let tableau = if starts { Newmark::trapezoidal().tableau() } else { self.tableau.clone() };
-        let stages = tableau.stages.len();
-        let reads = history::reads_after(&self.tableau, self.tableau.stages.len() - 1);
-        let by_velocities = history::depth(&tableau) == 1
-            && !(starts && reads.iter().any(|[.., a]| *a))
+        let tableau = if starts { Rc::new(Newmark::trapezoidal().tableau()) } else { Rc::clone(&self.tableau) };
+        let reads = Rc::clone(&self.reads);
+        let (stages, last) = (tableau.stages.len(), reads.len() - 1);
+        let by_velocities = (starts || self.depth == 1)
+            && !(starts && reads[last].iter().any(|[.., a]| *a))
             && tableau.stages.iter().all(|stage| stage.recovery.v.a.iter().all(|a| a.abs() < 1e-12));
         let closed_at_start = self.contacts.closed.clone();
         let before = self.contacts.forces.clone();
         let mut reported = before[..self.scene.rows.len()].to_vec();
         let slopes = self.slopes.clone();
         for (s, stage) in tableau.stages.iter().enumerate() {
-            let last = self.tableau.stages.len() - 1;
-            let reads = history::reads_after(&self.tableau, if starts { last } else { s });
             let place = Place {
                 stage,
-                reads: &reads,
+                reads: &reads[if starts { last } else { s }],
                 by_velocities,
                 starts,
                 t: self.since + f64::from(self.steps) * self.scene.h,
@@ -153,7 +168,7 @@ impl Truth {
         let ways = self.past[0].u.iter().zip(&self.past[1].u);
         self.slopes = ways.map(|(now, before)| (now - before) / self.scene.h).collect();
         self.made_with = self.scene.h;
-        self.past.truncate(depth);
+        self.past.truncate(self.depth);
         self.steps += 1;
     }
 

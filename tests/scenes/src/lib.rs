@@ -19,6 +19,8 @@ pub mod hosts;
 pub mod hyperelastic;
 pub mod impact_scenes;
 pub mod impacts;
+#[cfg(shared_instances)]
+mod instances;
 pub mod large;
 pub mod mindlin;
 pub mod obstacles;
@@ -41,4 +43,7 @@ pub mod wall_bar;
 pub mod well;
 
 pub use contact_dynamics_bars::{Bars, Figures, MassKind, Record, bars, masses, measure, record, sparse};
+#[cfg(shared_instances)]
+#[doc(hidden)]
+pub use instances::instances;
 pub use on_system::OnSystem;

@@ -373,9 +373,8 @@ impl<const D: usize> SecondOrderStack<D> {
         let (stiffness, mass) = self.solid.matrices();
         let system = || LinearSystem::lumped(mass.clone(), stiffness.clone());
         let areas: Vec<_> = self.areas().into_iter().enumerate().collect();
-        // (Motions far above 1/h are damped as well: nodes of second order are light.)
         let constraints: Vec<Box<dyn ContactConstraint<f64>>> = vec![Box::new(contact)];
-        under_pressure(&self.solid.nodes, self.solid.material, system, &areas, (0.5625, 0.3), constraints)
+        under_pressure(&self.solid.nodes, self.solid.material, system, &areas, constraints)
     }
 }
 

@@ -143,18 +143,16 @@ impl<const D: usize> Stack<D> {
                 areas.extend(force.into_iter().enumerate().take(D).map(|(axis, force)| (D * node + axis, force)));
             }
         }
-        under_pressure(&solid.nodes, solid.material, || Ok(solid.system()), &areas, (0.5, 0.1), constraints)
+        under_pressure(&solid.nodes, solid.material, || Ok(solid.system()), &areas, constraints)
     }
 }
 
-/// The patch test on two bodies of any elements, by parts of ∫ N n dA of dofs over the sides that face each other, and
-/// Newmark's β (γ = 1) and the step in units of time of the waves.
+/// The patch test on two bodies of any elements, by parts of ∫ N n dA of dofs over the sides that face each other.
 pub(crate) fn under_pressure<const D: usize>(
     nodes: &[[f64; D]],
     material: Material,
     system: impl Fn() -> Result<LinearSystem<'static, f64>>,
     areas: &[(usize, f64)],
-    (beta, step): (f64, f64),
     constraints: Vec<Box<dyn ContactConstraint<f64>>>,
 ) -> Result<f64> {
     let strain = 0.01;
@@ -176,10 +174,11 @@ pub(crate) fn under_pressure<const D: usize>(
             system = system.fix(D * node + axis)?;
         }
     }
-    // A strongly damped scheme: the static solution after a while.
+    // A strongly damped scheme: the static solution after a while. (Of motions that a step does not resolve it leaves a
+    // third. The slowest ones have a period of 0.8.)
     let mut run =
-        Simulation::builder(system, Newmark::new(beta, 1.0)?, step / time).constraints(constraints).build()?;
-    run.run_until(90.0 / time, &mut ())?;
+        Simulation::builder(system, Newmark::new(0.5625, 1.0)?, 0.3 / time).constraints(constraints).build()?;
+    run.run_until(40.0 / time, &mut ())?;
     let scale = exact.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let deviation = |(u, exact): (&f64, &f64)| (u - exact).abs();
     Ok(run.state().displacement().iter().zip(&exact).map(deviation).fold(0.0, f64::max) / scale)

@@ -71,7 +71,7 @@ pub(crate) fn correct(
         before,
         past,
         contacts,
-        responses: scene.axes().iter().map(|axis| scene.accelerate(axis)).collect(),
+        responses: responses(scene, correction),
         response: rows.map(|row| row.z / place.stage.balance.a.z),
         closed,
         engaged: Vec::new(),
@@ -103,6 +103,16 @@ pub(crate) fn correct(
     }
 }
 
+/// M⁻¹ of each row and tangent, where a correction needs them.
+fn responses(scene: &Scene, correction: Correction) -> Vec<Vec<f64>> {
+    let mut responses = match correction {
+        Correction::None => Vec::new(),
+        _ => scene.axes().map(<[f64]>::to_vec).collect(),
+    };
+    scene.accelerate_all(&mut responses);
+    responses
+}
+
 impl Step<'_> {
     fn h(&self) -> f64 {
         self.scene.h
@@ -119,7 +129,7 @@ impl Step<'_> {
 
     /// S between two axes.
     fn s(&self, i: usize, j: usize) -> f64 {
-        dot(self.scene.axes()[i], &self.responses[j])
+        dot(self.scene.axis(i), &self.responses[j])
     }
 
     /// λ_v/λ_a.
@@ -149,7 +159,6 @@ impl Step<'_> {
         let (scene, h, start) = (self.scene, self.h(), &self.past[1]);
         self.started = scene
             .axes()
-            .iter()
             .enumerate()
             .map(|(axis, g)| dot(g, &start.v) + scene.rows.get(axis).map_or(0.0, |row| row.offset.at(start.t)[1]))
             .collect();
@@ -191,7 +200,7 @@ impl Step<'_> {
             for &(i, impulse) in x {
                 let total = impulse + given * step.contacts.raw[i];
                 let own = step.scene.rows.get(i).map_or(0.0, |row| row.offset.at(step.past[0].t)[1]);
-                let now = dot(step.scene.axes()[i], &step.past[0].v) + own;
+                let now = dot(step.scene.axis(i), &step.past[0].v) + own;
                 let after = now + x.iter().map(|&(j, x)| step.s(i, j) * x).sum::<f64>();
                 work += total * (after + step.started[i]);
                 size += total.abs() * (after.abs() + step.started[i].abs());
@@ -230,8 +239,8 @@ impl Step<'_> {
             return 0.0;
         }
         let own = scene.rows.get(axis).map_or([0.0; 3], |row| row.offset.at(now.t));
-        let rate = dot(scene.axes()[axis], &now.v) + own[1];
-        let acceleration = dot(scene.axes()[axis], &now.a) + own[2];
+        let rate = dot(scene.axis(axis), &now.v) + own[1];
+        let acceleration = dot(scene.axis(axis), &now.a) + own[2];
         [ago * (0.5 * ago * acceleration - rate), rate - ago * acceleration, acceleration][field]
     }
 
@@ -272,7 +281,7 @@ impl Step<'_> {
             let part = |of: usize| {
                 let [s, d] = [&by_rest, &resisted].map(|a| {
                     let own = (0..forces.len()).filter(|&k| group[k] == of);
-                    own.map(|k| rests[k] * dot(scene.axes()[forces[k].0], a)).sum::<f64>()
+                    own.map(|k| rests[k] * dot(scene.axis(forces[k].0), a)).sum::<f64>()
                 });
                 if d > s { (s / d).powi(2) } else { 1.0 }
             };
@@ -309,8 +318,8 @@ impl Step<'_> {
             let (values, field) = if jump == Jump::Velocity { (&new.v, 1) } else { (&new.a, 2) };
             let own = scene.rows.get(axis).map_or(0.0, |row| row.offset.at(new.t)[field]);
             let asked = if jump == Jump::Velocity { self.asked.get(axis).copied().unwrap_or(0.0) } else { 0.0 };
-            q.push(dot(scene.axes()[axis], values) + own - asked);
-            noise.push(64.0 * f64::EPSILON * (size(scene.axes()[axis], values) + own.abs()));
+            q.push(dot(scene.axis(axis), values) + own - asked);
+            noise.push(64.0 * f64::EPSILON * (size(scene.axis(axis), values) + own.abs()));
             given.push(share * self.contacts.raw[axis]);
         }
         let w: Matrix = axes.iter().map(|&i| axes.iter().map(|&j| self.s(i, j)).collect()).collect();
@@ -375,7 +384,7 @@ impl Step<'_> {
         let mut force = product(damping, &change);
         if effective {
             let mut matrix = self.before.matrix.clone();
-            scene.hold(&mut matrix, &mut force);
+            scene.hold(&mut matrix, std::slice::from_mut(&mut force));
             let mut response = solve(matrix, force).expect("an effective matrix that is regular");
             // (They respond, and have no acceleration.)
             scene.massless().into_iter().for_each(|dof| response[dof] = 0.0);
@@ -420,8 +429,8 @@ impl Step<'_> {
                     let held = if field == 0 && holds { self.contacts.gaps[axis] } else { 0.0 };
                     dot(&row.g, values) + row.offset.at(old.t)[field] - held
                 }
-                None if field == 0 => dot(scene.axes()[axis], &old.u) - dot(scene.axes()[axis], &now.u),
-                None => dot(scene.axes()[axis], values),
+                None if field == 0 => dot(scene.axis(axis), &old.u) - dot(scene.axis(axis), &now.u),
+                None => dot(scene.axis(axis), values),
             })
             .zip(&axes)
             .map(|(jump, &axis)| jump - self.outgoing(axis, field, k))
@@ -446,7 +455,7 @@ impl Step<'_> {
         let noise: Vec<f64> = axes
             .iter()
             .zip(&jumps)
-            .map(|(&axis, jump)| 64.0 * f64::EPSILON * (size(scene.axes()[axis], values) + jump.abs()))
+            .map(|(&axis, jump)| 64.0 * f64::EPSILON * (size(scene.axis(axis), values) + jump.abs()))
             .collect();
         let w: Matrix = axes.iter().map(|&i| axes.iter().map(|&j| self.s(i, j)).collect()).collect();
         // Tangents of what sticks become contacts of their own, behind the rows in the order of the problem.

@@ -30,25 +30,31 @@ pub(crate) fn add(y: &mut [f64], c: f64, x: &[f64]) {
 
 /// A⁻¹ b by elimination with row pivoting; none for a matrix that is singular.
 pub(crate) fn solve(mut a: Matrix, mut b: Vec<f64>) -> Option<Vec<f64>> {
-    let n = b.len();
+    eliminate(&mut a, std::slice::from_mut(&mut b)).then_some(b)
+}
+
+/// The same for several b, in their place; says whether the matrix is regular.
+pub(crate) fn eliminate(a: &mut Matrix, columns: &mut [Vec<f64>]) -> bool {
+    let n = a.len();
     for k in 0..n {
-        let best = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs()))?;
+        let best = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap_or(k);
         if a[best][k].abs() < 1e-300 {
-            return None;
+            return false;
         }
         a.swap(k, best);
-        b.swap(k, best);
+        columns.iter_mut().for_each(|b| b.swap(k, best));
         let (pivots, rest) = a.split_at_mut(k + 1);
-        let (solved, open) = b.split_at_mut(k + 1);
-        for (row, b) in rest.iter_mut().zip(open) {
+        for (row, i) in rest.iter_mut().zip(k + 1..) {
             let factor = row[k] / pivots[k][k];
             add(&mut row[k..], -factor, &pivots[k][k..]);
-            *b -= factor * solved[k];
+            columns.iter_mut().for_each(|b| b[i] -= factor * b[k]);
         }
     }
-    for k in (0..n).rev() {
-        let known = dot(&a[k][k + 1..], &b[k + 1..]);
-        b[k] = (b[k] - known) / a[k][k];
+    for b in columns {
+        for k in (0..n).rev() {
+            let known = dot(&a[k][k + 1..], &b[k + 1..]);
+            b[k] = (b[k] - known) / a[k][k];
+        }
     }
-    Some(b)
+    true
 }

@@ -1,7 +1,7 @@
 //! Contact problems of a few contacts, solved by trying everything: each contact in each of its modes.
 
 use super::Scene;
-use super::dense::{Matrix, dot, solve, zeros};
+use super::dense::{Matrix, dot, eliminate, zeros};
 use contact_dynamics::ContactLaw;
 
 /// What is asked of one contact.
@@ -82,21 +82,21 @@ impl Problem {
     pub(crate) fn solve(&self) -> Vec<f64> {
         let modes: Vec<Vec<Mode>> = self.contacts.iter().map(Contact::modes).collect();
         let choices: usize = modes.iter().map(Vec::len).product();
-        let mut best = (f64::INFINITY, vec![0.0; self.q.len()]);
+        let size = self.q.len();
+        let mut best = (f64::INFINITY, vec![0.0; size]);
+        let (mut matrix, mut r, mut chosen) = (zeros(size, size), vec![0.0; size], Vec::new());
         for choice in 0..choices {
             let mut rest = choice;
-            let chosen: Vec<Mode> = modes
-                .iter()
-                .map(|modes| {
-                    let mode = modes[rest % modes.len()];
-                    rest /= modes.len();
-                    mode
-                })
-                .collect();
-            if let Some(r) = self.multipliers(&chosen) {
+            chosen.clear();
+            chosen.extend(modes.iter().map(|modes| {
+                let mode = modes[rest % modes.len()];
+                rest /= modes.len();
+                mode
+            }));
+            if self.multipliers(&chosen, &mut matrix, &mut r) {
                 let violation = self.violation(&chosen, &r);
                 if violation < best.0 {
-                    best = (violation, r);
+                    best = (violation, r.clone());
                 }
                 if violation <= 1.0 {
                     break;
@@ -106,30 +106,30 @@ impl Problem {
         best.1
     }
 
-    /// The multipliers of a choice of modes.
-    fn multipliers(&self, modes: &[Mode]) -> Option<Vec<f64>> {
-        let size = self.q.len();
-        let (mut a, mut b) = (zeros(size, size), vec![0.0; size]);
-        let vanish = |a: &mut Matrix, b: &mut Vec<f64>, row: usize| {
+    /// The multipliers of a choice of modes, if there are any; `a` is room for a matrix.
+    fn multipliers(&self, modes: &[Mode], a: &mut Matrix, r: &mut Vec<f64>) -> bool {
+        a.iter_mut().for_each(|row| row.fill(0.0));
+        r.fill(0.0);
+        let vanish = |a: &mut Matrix, r: &mut Vec<f64>, row: usize| {
             a[row].clone_from(&self.w[row]);
-            b[row] = -self.q[row];
+            r[row] = -self.q[row];
         };
         for (i, (contact, mode)) in self.contacts.iter().zip(modes).enumerate() {
             match mode {
                 Mode::Open => a[i][i] = 1.0,
-                Mode::Closed | Mode::Stick | Mode::Slide(_) => vanish(&mut a, &mut b, i),
+                Mode::Closed | Mode::Stick | Mode::Slide(_) => vanish(a, r, i),
             }
             let Some(Friction { row, coefficient, .. }) = contact.friction else { continue };
             match mode {
                 Mode::Open | Mode::Closed => a[row][row] = 1.0,
-                Mode::Stick => vanish(&mut a, &mut b, row),
+                Mode::Stick => vanish(a, r, row),
                 Mode::Slide(direction) => {
                     a[row][row] = 1.0;
                     a[row][i] = -coefficient * direction;
                 }
             }
         }
-        solve(a, b)
+        eliminate(a, std::slice::from_mut(r))
     }
 
     /// By how much a solution violates the conditions of its modes, in units of rounding.

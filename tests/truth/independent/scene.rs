@@ -1,6 +1,6 @@
 //! Scenes of a few dofs, and the parts of the crate that they make.
 
-use super::dense::{Matrix, dot, size, solve};
+use super::dense::{Matrix, dot, eliminate, size};
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::tableau::StartUp;
@@ -149,16 +149,28 @@ impl Scene {
 
     /// M⁻¹ f on the dofs that are free and have a mass.
     pub(crate) fn accelerate(&self, f: &[f64]) -> Vec<f64> {
-        let (mut mass, mut f) = (self.mass.clone(), f.to_vec());
-        self.hold(&mut mass, &mut f);
-        for dof in self.massless() {
-            (mass[dof][dof], f[dof]) = (1.0, 0.0);
-        }
-        solve(mass, f).expect("a mass that is positive definite")
+        let mut accelerations = [f.to_vec()];
+        self.accelerate_all(&mut accelerations);
+        let [acceleration] = accelerations;
+        acceleration
     }
 
-    /// Makes the row and column of a driven dof those of a unit, and its entry zero.
-    pub(crate) fn hold(&self, matrix: &mut Matrix, f: &mut [f64]) {
+    /// The same of several f, in their place.
+    pub(crate) fn accelerate_all(&self, f: &mut [Vec<f64>]) {
+        if f.is_empty() {
+            return;
+        }
+        let mut mass = self.mass.clone();
+        self.hold(&mut mass, f);
+        for dof in self.massless() {
+            mass[dof][dof] = 1.0;
+            f.iter_mut().for_each(|f| f[dof] = 0.0);
+        }
+        assert!(eliminate(&mut mass, f), "a mass that is not positive definite");
+    }
+
+    /// Makes the row and column of a driven dof those of a unit, and its entries zero.
+    pub(crate) fn hold(&self, matrix: &mut Matrix, f: &mut [Vec<f64>]) {
         if let Some((dof, _)) = self.drive {
             for (i, row) in matrix.iter_mut().enumerate() {
                 row[dof] = f64::from(u8::from(i == dof));
@@ -166,14 +178,19 @@ impl Scene {
             for (j, entry) in matrix[dof].iter_mut().enumerate() {
                 *entry = f64::from(u8::from(j == dof));
             }
-            f[dof] = 0.0;
+            f.iter_mut().for_each(|f| f[dof] = 0.0);
         }
     }
 
     /// Normal rows and tangents.
-    pub(crate) fn axes(&self) -> Vec<&[f64]> {
+    pub(crate) fn axes(&self) -> impl Iterator<Item = &[f64]> {
         let tangents = self.rows.iter().filter_map(|row| row.friction.as_ref()).map(|(_, tangent)| &tangent[..]);
-        self.rows.iter().map(|row| &row.g[..]).chain(tangents).collect()
+        self.rows.iter().map(|row| &row.g[..]).chain(tangents)
+    }
+
+    /// One of them.
+    pub(crate) fn axis(&self, number: usize) -> &[f64] {
+        self.axes().nth(number).expect("an axis of the scene")
     }
 
     /// The number of the tangent of a row among the axes.

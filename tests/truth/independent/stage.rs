@@ -1,7 +1,7 @@
 //! One stage: the balance, the conditions of the contact laws, and which contacts are closed in the end (theory,
 //! sections 2, 5 and 18).
 
-use super::dense::{Matrix, add, dot, product, size, solve as solve_dense, zeros};
+use super::dense::{Matrix, add, dot, eliminate, product, size, zeros};
 use super::problem::{Contact, Friction, Problem};
 use super::rows::{Affine, Target, motion, target};
 use super::start::settle;
@@ -101,7 +101,7 @@ pub(crate) fn solve(
     }
     let mut given = vec![0.0; scene.dofs()];
     pressed.iter().for_each(|(i, force)| add(&mut given, *force, &scene.rows[*i].g));
-    let (mut matrix, free) = balanced(scene, &balance, (t_balance, &given), &vec![0.0; scene.dofs()]);
+    let (mut matrix, free, mut responses) = balanced(scene, &balance, (t_balance, &given), &vec![0.0; scene.dofs()]);
     let target = target(stage, past, scene, place.t);
     let mut work = Stage { scene, place, past, new, balance, target, t_balance, t_new, free, follows };
     if let (Correction::Stabilized | Correction::StabilizedClosed, None) = (correction, &work.target.forecast) {
@@ -115,15 +115,6 @@ pub(crate) fn solve(
     // Newton's method, with the contacts found anew in each iteration: one of them where nothing is cubic.
     loop {
         let forms = work.forms(by_way);
-        let responses: Vec<Vec<f64>> = scene
-            .axes()
-            .iter()
-            .map(|axis| {
-                let (mut a, mut f) = (matrix.clone(), axis.to_vec());
-                scene.hold(&mut a, &mut f);
-                solve_dense(a, f).expect("an effective matrix that is regular")
-            })
-            .collect();
         let mut raw = work.multipliers(forms.clone(), &responses);
         let before = std::mem::replace(&mut z, work.free.clone());
         raw.iter().zip(&responses).for_each(|(r, response)| add(&mut z, *r, response));
@@ -135,12 +126,18 @@ pub(crate) fn solve(
         if scene.cubic.is_empty() || largest(&moved) <= 4.0 * f64::EPSILON * largest(&z) || steps == 40 {
             return work.finish(&forms, &z, raw, matrix);
         }
-        (matrix, work.free) = balanced(scene, &work.balance, (t_balance, &given), &z);
+        (matrix, work.free, responses) = balanced(scene, &work.balance, (t_balance, &given), &z);
     }
 }
 
-/// The effective matrix about some z, and z without contact but for forces that are given.
-fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], (t, given): (f64, &[f64]), z: &[f64]) -> (Matrix, Vec<f64>) {
+/// The effective matrix about some z, z without contact but for forces that are given, and what unit multipliers make
+/// of z.
+fn balanced(
+    scene: &Scene,
+    [u, v, a]: &[Affine; 3],
+    (t, given): (f64, &[f64]),
+    z: &[f64],
+) -> (Matrix, Vec<f64>, Vec<Vec<f64>>) {
     let n = scene.dofs();
     let mut f = scene.force(t, &u.at(z), &v.at(z));
     add(&mut f, 1.0, given);
@@ -156,10 +153,12 @@ fn balanced(scene: &Scene, [u, v, a]: &[Affine; 3], (t, given): (f64, &[f64]), z
     for dof in scene.massless().into_iter().filter(|_| u.weight.iter().all(|weight| weight.abs() <= 0.0)) {
         (matrix[dof][dof], f[dof]) = (1.0, 0.0);
     }
-    scene.hold(&mut matrix, &mut f);
-    let mut free = solve_dense(matrix.clone(), f).expect("an effective matrix that is regular");
+    let mut columns: Vec<Vec<f64>> = scene.axes().map(<[f64]>::to_vec).chain([f]).collect();
+    scene.hold(&mut matrix, &mut columns);
+    assert!(eliminate(&mut matrix.clone(), &mut columns), "an effective matrix that is singular");
+    let mut free = columns.pop().unwrap_or_default();
     add(&mut free, 1.0, z);
-    (matrix, free)
+    (matrix, free, columns)
 }
 
 /// The shift D of u + h v to what contacts admit, in the norm of the mass (theory, section 16).
@@ -173,7 +172,8 @@ fn shift(scene: &Scene, start: &Motion, correction: Correction, closed: &[bool],
         .filter(|&i| matches!(scene.rows[i].law, ContactLaw::Rigid | ContactLaw::Equality))
         .filter(|&i| (correction == Correction::Stabilized || closed[i]) && scene.has_mass(i))
         .collect();
-    let responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.accelerate(&scene.rows[i].g)).collect();
+    let mut responses: Vec<Vec<f64>> = rows.iter().map(|&i| scene.rows[i].g.clone()).collect();
+    scene.accelerate_all(&mut responses);
     let problem = Problem::of_gaps(scene, &rows, &responses, t, &u);
     let mut shift = vec![0.0; scene.dofs()];
     problem.solve().iter().zip(&responses).for_each(|(mu, response)| add(&mut shift, *mu, response));

@@ -27,7 +27,7 @@ pub(crate) fn begin(scene: &Scene, tableau: &Tableau, correction: Correction) ->
     let driven = now.a.clone();
     now.a = scene.accelerate(&f);
     add(&mut now.a, 1.0, &driven);
-    let mut raw = vec![0.0; scene.axes().len()];
+    let mut raw = vec![0.0; scene.axes().count()];
     let gaps: Vec<f64> = (0..rows).map(|i| scene.gap(i, 0.0, &now.u)).collect();
     let mut closed = vec![false; rows];
     for (i, row) in scene.rows.iter().enumerate() {
@@ -148,7 +148,7 @@ fn is_free_flight(scene: &Scene, past: &[Motion]) -> bool {
 
 /// a += c M⁻¹ Gᵀ r over all rows and tangents.
 fn push(scene: &Scene, r: &[f64], c: f64, a: &mut [f64]) {
-    for (axis, r) in scene.axes().iter().zip(r) {
+    for (axis, r) in scene.axes().zip(r) {
         add(a, c * r, &scene.accelerate(axis));
     }
 }
@@ -208,7 +208,7 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
     };
     let taken: Vec<usize> = (0..rows.len()).filter(|&i| !scene.is_static(i) && asks(i).is_some()).collect();
     let tangents: Vec<usize> = taken.iter().filter_map(|&i| scene.tangent(i)).collect();
-    let axes = scene.axes();
+    let axes: Vec<&[f64]> = scene.axes().collect();
     let all: Vec<usize> = taken.iter().chain(&tangents).copied().collect();
     let mut behind = taken.len();
     let contacts = taken.iter().map(|&i| {
