@@ -222,6 +222,10 @@ fn step_back<T: Real>(
     if turns {
         // The candidates of the step.
         run.constraints.search(&from.motion, run.scheme.ahead() * step.h, &mut run.g)?;
+        if run.constraints.ids != step.state.contacts.ids {
+            let part = "the gradient through rows that turn".into();
+            return Err(Error::Incompatible { part, reason: "a search from a state of the run finds other contacts" });
+        }
     }
     let Simulation { parts, compiled, work, constraints, g, .. } = run;
     let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);

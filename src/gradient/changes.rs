@@ -52,7 +52,8 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
             let (psi, w) = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
             let closed = released(&change.rules, &psi);
             if let Some(turning) = &mut self.turning {
-                turning.undo_change(change, &closed, &w, &self.step.state.motion, new)?;
+                let solved = record.solved.as_ref().unwrap_or(&self.step.state.motion);
+                turning.undo_change(change, &closed, &w, solved, new)?;
             }
             self.back.give([w]);
             for (k, (&row, rule)) in change.rows.iter().zip(&change.rules).enumerate() {

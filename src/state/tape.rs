@@ -100,6 +100,8 @@ pub(crate) struct StageRecord<T> {
     pub(crate) impulse: T,
     /// In the order in which they were made.
     pub(crate) changes: Vec<Change<T>>,
+    /// The corrected state of a stage before the last, if rows turn.
+    pub(crate) solved: Option<Motion<T>>,
 }
 
 /// What a row obeys.
@@ -289,10 +291,11 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// Adds the corrections of the stage recorded last.
-    pub(crate) fn correct(&mut self, changes: &mut Changes<T>) {
+    /// Adds the corrections of the stage recorded last, and its corrected state if it is wanted.
+    pub(crate) fn correct(&mut self, changes: &mut Changes<T>, solved: Option<&Motion<T>>) {
         if let Some(stage) = self.stages.last_mut() {
             stage.changes.append(&mut changes.list);
+            stage.solved = solved.cloned();
         }
         if let Some(Refusal { what, reason }) = changes.refusal.take() {
             self.refuse(what, reason);

@@ -58,7 +58,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         if !self.constraints.is_affine() && held.iter().any(|held: &Held<T>| held.is_slip) {
             tape.refuse("friction along rows that turn", "its derivative is not implemented");
         }
-        tape.stages.push(StageRecord { balance, rows, forces, held, impulse, changes: Vec::new() });
+        tape.stages.push(StageRecord { balance, rows, forces, held, impulse, changes: Vec::new(), solved: None });
         Ok(())
     }
 

@@ -83,7 +83,8 @@ impl<T: Real> Simulation<'_, T> {
             let scheme = numbers(stage, clock.h, covector, [place, stages]);
             correct(solve, scheme, correctors, Corrected { correction, block: block.as_mut(), massless, backup })?;
             if let (Some(tape), Some(changes)) = (tape, &mut correction.buffers.changes) {
-                tape.correct(changes);
+                let is_read = place + 1 < stages && !constraints.is_affine();
+                tape.correct(changes, history.slots.first().filter(|_| is_read));
             }
         }
         Ok(())
