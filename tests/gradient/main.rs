@@ -1,6 +1,7 @@
 //! Gradients of runs: against differences of whole runs, and against closed forms.
 
 mod closed_forms;
+mod many;
 mod refused;
 mod scenes;
 mod throw;
