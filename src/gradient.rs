@@ -72,7 +72,10 @@ impl<T: Real> Simulation<'_, T> {
     pub fn record(&mut self) -> Result<()> {
         self.check_sound()?;
         let past = support::check(self)?;
-        self.work.tape = Some(Box::new(Tape::new(self.state.clone(), past)));
+        let presses = |&row: &usize| self.state.contacts.lambda[row] != T::zero();
+        let held =
+            (0..self.constraints.len()).filter(|row| presses(row) || self.constraints.laws()[*row].is_equality());
+        self.work.tape = Some(Box::new(Tape::new(self.state.clone(), held.collect(), past)));
         self.work.correction.buffers.changes = Some(Box::default());
         Ok(())
     }

@@ -158,7 +158,7 @@ impl<T: Real> Way<'_, T> {
         start: &State<T>,
     ) -> Result<()> {
         for (place, step) in steps.iter().enumerate().rev() {
-            let mut seeds = self.seed((first + place + 1, step.h), &step.state, back);
+            let seeds = self.seed((first + place + 1, step.h), &step.state, back);
             let [shares, past] = rate_shares(&run.scheme.shifts, step.extrapolates);
             for field in 0..2 {
                 T::axpy(shares[field], &seeds.rates[field], self.states[0].field_mut(field + 1));
@@ -166,9 +166,9 @@ impl<T: Real> Way<'_, T> {
                     T::axpy(past[field], &seeds.rates[field], self.states[1].field_mut(field + 1));
                 }
             }
-            back.give(seeds.rates.iter_mut().map(std::mem::take));
             let from = place.checked_sub(1).map_or(start, |before| &steps[before].state);
             step_back((run, &mut self.starter), back, (from, step), &seeds, &mut self.states)?;
+            back.give(seeds.rates.into_iter().chain([seeds.force, seeds.impulse]));
         }
         Ok(())
     }

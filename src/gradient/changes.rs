@@ -49,11 +49,11 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
                 let reported = change.force * force[row] + change.impulse * impulse[row];
                 reported + if guides { totals[row] } else { T::zero() }
             };
-            let (psi, w) = self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
-            let closed = released(&change.rules, &psi);
+            let Removed { psi, sigma, w } =
+                self.remove(&record.rows, change, motion.field_mut(change.field), damped.as_ref(), read)?;
             if let Some(turning) = &mut self.turning {
                 let solved = record.solved.as_ref().unwrap_or(&self.step.state.motion);
-                turning.undo_change(change, &closed, &w, solved, new)?;
+                turning.undo_change(change, &sigma, &w, solved, new)?;
             }
             self.back.give([w]);
             for (k, (&row, rule)) in change.rows.iter().zip(&change.rules).enumerate() {
@@ -62,10 +62,10 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
                 }
                 match *rule {
                     Rule::Closed if change.field == 0 && !record.rows.is_tangential(row) => {
-                        *self.back.gaps.entry(self.step.state.contacts.ids[row]).or_insert(T::zero()) -= closed[k];
+                        *self.back.gaps.entry(self.step.state.contacts.ids[row]).or_insert(T::zero()) -= sigma[k];
                     }
                     // A past displacement is moved to that of the state where the contact sticks.
-                    Rule::Closed if change.field == 0 => record.rows.scatter(row, closed[k], &mut new.u),
+                    Rule::Closed if change.field == 0 => record.rows.scatter(row, sigma[k], &mut new.u),
                     Rule::Closed => {}
                     Rule::Unloaded => raw[row] -= change.share * psi[k],
                     Rule::Slides { normal, share, turn, by } => {
@@ -103,8 +103,7 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
         }
     }
 
-    /// Undoes a change in the derivatives `x`; returns ψ of its conditions, and w. `read` are the derivatives by a unit
-    /// of the multiplier of a row.
+    /// Undoes a change in the derivatives `x`. `read` are the derivatives by a unit of the multiplier of a row.
     fn remove(
         &mut self,
         g: &ContactJacobian<T>,
@@ -112,11 +111,12 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
         x: &mut [T],
         damped: Option<&Damped<T>>,
         read: impl Fn(usize) -> T,
-    ) -> Result<(Vec<T>, Vec<T>)> {
+    ) -> Result<Removed<T>> {
         let Self { system, back, .. } = self;
         let Change { rows, rules, multipliers, .. } = change;
         // The derivatives by the change itself.
-        let mut w = x.to_vec();
+        let mut w = back.zeros(x.len());
+        w.copy_from_slice(x);
         if let Some(damped) = damped {
             back.tangents.add_damping(&**system, -damped.share, &damped.w, &mut w);
         }
@@ -126,13 +126,14 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
         let sigma = released(rules, &psi);
         rows.iter().zip(&sigma).for_each(|(&row, &sigma)| g.scatter(row, -sigma, x));
         back.projection.push(g, (rows, &sigma), -T::one(), &mut w)?;
-        let mut moved = vec![T::zero(); w.len()];
+        let mut moved = back.zeros(w.len());
         back.projection.push(g, (rows, multipliers), T::one(), &mut moved)?;
         back.parameters.inertia(&mut **system, &moved, &w)?;
         if let Some(damped) = damped {
             self.differentiate_damping(damped, &moved)?;
         }
-        Ok((psi, w))
+        self.back.give([moved]);
+        Ok(Removed { psi, sigma, w })
     }
 
     /// The derivatives by the parameters in (M, or A h²/w_ā) δa = −C δv.
@@ -157,6 +158,13 @@ impl<T: Real> ChangesBack<'_, '_, '_, T> {
         self.back.parameters.force(&mut *self.system, &at(&rest, &rest), &opposite)?;
         self.back.parameters.inertia(&mut *self.system, &scaled(by_a), w)
     }
+}
+
+/// A change that is undone: ψ of its conditions, σ = Pᵀ ψ, and the derivatives w by M times the change.
+struct Removed<T> {
+    psi: Vec<T>,
+    sigma: Vec<T>,
+    w: Vec<T>,
 }
 
 /// Damping forces that follow a change of velocities δv: δa = −share (M or A)⁻¹ C δv, as in the correction.

@@ -12,7 +12,8 @@ pub(super) fn take_again<T: Real>(
     (state, history): &(State<T>, History<T>),
     sizes: &[f64],
 ) -> Result<Tape<T>> {
-    run.work.tape = Some(Box::new(Tape::new(tape.start.clone(), tape.past)));
+    let empty = || Tape::new(tape.start.clone(), tape.held.clone(), tape.past);
+    run.work.tape = Some(Box::new(empty()));
     let kept = (
         std::mem::replace(&mut run.state, state.clone()),
         std::mem::replace(&mut run.history, history.clone()),
@@ -34,7 +35,7 @@ pub(super) fn take_again<T: Real>(
     ) = kept;
     let taken = run.work.tape.take();
     result?;
-    Ok(taken.map_or_else(|| Tape::new(tape.start.clone(), tape.past), |taken| *taken))
+    Ok(taken.map_or_else(empty, |taken| *taken))
 }
 
 fn take_steps<T: Real>(run: &mut Simulation<'_, T>, sizes: &[f64]) -> Result<()> {

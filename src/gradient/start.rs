@@ -47,7 +47,7 @@ pub(super) fn start_back<T: Real>(
     let Simulation { parts, constraints, g, .. } = run;
     let contacts = &tape.start.contacts;
     let (mut rows, mut rules) = (Vec::new(), Vec::new());
-    for row in (0..contacts.ids.len()).filter(|&row| contacts.lambda[row] != T::zero()) {
+    for &row in &tape.held {
         let (normal, force) = (rows.len(), contacts.lambda[row]);
         let bound = T::of(contacts.tangents.friction(row)) * force;
         rows.push(row);

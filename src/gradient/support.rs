@@ -41,7 +41,7 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
         return refuse("forces along a path".into(), "choose another scheme");
     }
     if !compiled.program.operators.iter().all(Operator::is_symmetric) {
-        return refuse("an unsymmetric or iterative linear solver".into(), "choose `Automatic`");
+        return refuse("a linear solver that may be unsymmetric".into(), "choose `Automatic`");
     }
     let tangents = run.constraints.tangents();
     let slides_in_space = |row: usize| {

@@ -25,7 +25,7 @@ use crate::simulation::stage::contact::ContactWork;
 use crate::simulation::step::judge::Verdict;
 use crate::simulation::step::jumps::store_exerting;
 use crate::simulation::watch::stiffening::SolvedStep;
-use crate::state::History;
+use crate::state::{Changes, History};
 
 impl<T: Real> Simulation<'_, T> {
     /// Tries a step of the present size.
@@ -78,6 +78,10 @@ impl<T: Real> Simulation<'_, T> {
         }
         if let Some(tape) = &mut work.tape {
             tape.stages.clear();
+        }
+        // An attempt that failed within its corrections has left them.
+        if let Some(changes) = &mut work.correction.buffers.changes {
+            **changes = Changes::default();
         }
         work.backup.begin();
         work.contact.impulses.begin();

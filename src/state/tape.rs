@@ -10,6 +10,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(crate) struct Tape<T> {
     pub(crate) start: State<T>,
+    /// The contacts that press there, or hold in both directions.
+    pub(crate) held: Vec<usize>,
     /// The past at the start that the first step reads.
     pub(crate) past: StartingPast,
     pub(crate) steps: Vec<StepRecord<T>>,
@@ -269,9 +271,9 @@ impl<T: Real> Changes<T> {
 
 impl<T: Real> Tape<T> {
     /// An empty tape.
-    pub(crate) fn new(start: State<T>, past: StartingPast) -> Self {
+    pub(crate) fn new(start: State<T>, held: Vec<usize>, past: StartingPast) -> Self {
         let (steps, stages) = (Vec::new(), Vec::new());
-        Self { start, past, steps, checkpoints: None, stages, rows: None, refusal: None }
+        Self { start, held, past, steps, checkpoints: None, stages, rows: None, refusal: None }
     }
 
     /// Refuses a gradient of this run, for the first reason given.

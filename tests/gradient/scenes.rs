@@ -2,7 +2,7 @@
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::gradient::Scales;
+use contact_dynamics::gradient::{RecordedStep, Scales, Seed};
 use contact_dynamics::{
     Bathe, CdLagrange, Composite, ContactLaw, GeneralizedAlpha, LinearRows, LinearSystem, Newmark, NodesOnObstacle,
     PersistencyCorrection, Result, Simulation, StepControl, TimeIntegrator,
@@ -269,4 +269,21 @@ fn a_mass_in_a_bowl() {
             assert_equal(&error, &format!("{swing}, {}", scheme().name()));
         }
     }
+}
+
+/// A tie without force at the start holds all the same: its accelerations do not follow the displacements.
+#[test]
+fn a_tie_without_force_at_the_start() {
+    let stiffness = SparseColMat::<usize, f64>::try_new_from_triplets(1, 1, &[Triplet::new(0, 0, 8.0)]).unwrap();
+    let system = LinearSystem::lumped(vec![2.0], stiffness).unwrap();
+    let tie = LinearRows::new().row(ContactLaw::Equality, &[(0, 1.0)], 0.0);
+    let mut run = Simulation::builder(system, Newmark::trapezoidal(), 0.01).constraint(tie).build().unwrap();
+    run.record().unwrap();
+    run.step().unwrap();
+    let mut acceleration = |step: &RecordedStep<'_, f64>, seed: &mut Seed<'_, f64>| {
+        seed.acceleration[0] += if step.step == 0 { 1.0 } else { 0.0 };
+        0.0
+    };
+    let gradient = run.gradient(&mut acceleration, &mut ()).unwrap();
+    assert!(gradient.displacement[0].abs() < 1e-12, "{gradient:?}");
 }
