@@ -62,13 +62,14 @@ impl<T: Real> Simulation<'_, T> {
     /// [`Error::Incompatible`] names the part that has no derivative here: dofs without mass, ranks, correctors other
     /// than [`PersistencyCorrection`](crate::PersistencyCorrection), unsymmetric effective matrices, forces along a path,
     /// nonlinear damping with a correction, rows that turn (curved obstacles, meshes that slide on each other) with a
-    /// scheme that imposes contact on velocities, at the start a force of a compliant law or friction that slides in
-    /// space; and a run that has taken steps.
+    /// scheme that imposes contact on velocities, at the start overlaps that gaps leave out, a force of a compliant law
+    /// or friction that slides in space; and a run that has taken steps.
     ///
     /// [`gradient`](Self::gradient) refuses what occurred in the run: forces under other [laws](crate::ContactLaw) than
     /// `Rigid`, `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, changes of the step size if the
-    /// scheme reads more than u, v and a of the last state, restarts, damping that a step does not resolve, and along rows
-    /// that turn friction, damped laws and projections of the past.
+    /// scheme reads more than u, v and a of the last state, restarts, damping that a step does not resolve, penetration
+    /// that comes out in several steps, and along rows that turn friction, damped laws, projections of the past, and
+    /// places where rows jump.
     pub fn record(&mut self) -> Result<()> {
         self.check_sound()?;
         let past = support::check(self)?;

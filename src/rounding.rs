@@ -98,6 +98,12 @@ pub(crate) fn touching<T: Float>(way: T) -> T {
     number::<T>(1e-10) * way + rounding(way)
 }
 
+// Gradients.
+
+/// How far differences of rows over two distances may be apart, relative to the derivative and to that of a row which
+/// turns by 1 over the length from which it is computed. They agree to √ε and better, except across a jump.
+pub(crate) const DIFFERENCES: f64 = 1e-4;
+
 // Geometry of surfaces.
 
 /// The share of a facet or an edge, and the sine of an angle, below which a value is rounding.

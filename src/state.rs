@@ -19,13 +19,14 @@ pub(crate) use backup::Backup;
 #[cfg(feature = "serde")]
 pub use checkpoint::Checkpoint;
 pub(crate) use clock::{Clock, Pace, Refusal};
-pub(crate) use contacts::Names;
 pub use contacts::{ContactState, ContactStatus};
+pub(crate) use contacts::{Names, slides};
 pub(crate) use history::ComputedMotions;
 pub use history::History;
 pub(crate) use overclosures::Overclosures;
 pub(crate) use tape::{
-    Change, Changes, Checkpoints, Compliance, Guide, Held, Rule, StageRecord, StartingPast, StepRecord, Tape, slides,
+    Change, Changes, Checkpoints, Compliance, Guide, Held, NoDerivative, Rule, StageRecord, StartingPast, StepRecord,
+    Tape,
 };
 
 use crate::contact::BrokenBond;

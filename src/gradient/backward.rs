@@ -198,6 +198,20 @@ fn rate_shares<T: Real>(shifts: &[f64; 2], extrapolates: bool) -> [[T; 2]; 2] {
     [shifts.map(|shift| T::of(1.0 - shift)), shifts.map(T::of)]
 }
 
+/// Finds the candidates of a step again, from its start and with its size.
+pub(super) fn find_candidates<T: Real>(
+    run: &mut Simulation<'_, T>,
+    (start, h): (&Motion<T>, f64),
+    expected: &[ContactId],
+) -> Result<()> {
+    run.constraints.search(start, run.scheme.ahead() * h, &mut run.g)?;
+    if run.constraints.ids != expected {
+        let part = "the gradient through rows that turn".into();
+        return Err(Error::Incompatible { part, reason: "a search from a state of the run finds other contacts" });
+    }
+    Ok(())
+}
+
 /// Goes back through a step. On entry `states` holds the derivatives by the state at its end and by older ones, on
 /// return by the state at its start and by older ones.
 fn step_back<T: Real>(
@@ -220,12 +234,7 @@ fn step_back<T: Real>(
     let no_force = back.zeros(rows);
     let turns = !run.constraints.is_affine() && step.stages.iter().any(|stage| !stage.held.is_empty());
     if turns {
-        // The candidates of the step.
-        run.constraints.search(&from.motion, run.scheme.ahead() * step.h, &mut run.g)?;
-        if run.constraints.ids != step.state.contacts.ids {
-            let part = "the gradient through rows that turn".into();
-            return Err(Error::Incompatible { part, reason: "a search from a state of the run finds other contacts" });
-        }
+        find_candidates(run, (&from.motion, step.h), &step.state.contacts.ids)?;
     }
     let Simulation { parts, compiled, work, constraints, g, .. } = run;
     let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);

@@ -2,7 +2,7 @@
 
 use super::Balance;
 use super::backward::Back;
-use super::conditions::{are_closed, released, solve_transposed};
+use super::conditions::{released, solve_transposed};
 use super::turning::Turning;
 use crate::contact::ContactJacobian;
 use crate::contact_solver::no_response;
@@ -185,7 +185,7 @@ impl<T: Real> Back<'_, T> {
         contacts: &ContactState<T>,
     ) -> Result<()> {
         let Self { projection, factor, factorized, .. } = self;
-        if are_closed(rules.iter().copied()) {
+        if rules.iter().all(|rule| *rule == Rule::Closed) {
             projection.close(g, rows)?;
             projection.solve(x);
             return Ok(());

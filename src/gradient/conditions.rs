@@ -10,11 +10,6 @@ use crate::dense::DenseCholesky;
 use crate::real::Real;
 use crate::state::{Guide, Rule};
 
-/// Whether rules are conditions on y alone.
-pub(super) fn are_closed<T: Real>(mut rules: impl Iterator<Item = Rule<T>>) -> bool {
-    rules.all(|rule| rule == Rule::Closed)
-}
-
 /// Solves for ψ, in place of x̄, with B given by `entry(i, j)` and c added to the diagonal of closed rows. `Err` is a
 /// row whose matrix is singular.
 pub(super) fn solve_transposed<T: Real>(

@@ -129,7 +129,7 @@ impl<T: Real> StageBack<'_, '_, '_, T> {
         let Some(turning) = turning.as_mut().filter(|_| !record.held.is_empty()) else { return Ok(()) };
         let (rows, forces): (Vec<usize>, Vec<T>) = record.held.iter().map(|held| (held.row, held.force)).unzip();
         let path = Path { from: (record.balance.t, &record.balance.u), rates: (0.0, w) };
-        turning.add_first(path, (&rows, &forces), c, out)
+        turning.add_derivative(1, path, (&rows, &forces), c, out)
     }
 
     /// [`solve`](Self::solve) with rows that turn: the matrix has the stiffness of turning forces, and rigid forces act

@@ -1,7 +1,7 @@
 //! The transpose of the state at the start: accelerations from the balance with the contacts that touch, and the past.
 
 use super::Balance;
-use super::backward::{Back, Seeds};
+use super::backward::{Back, Seeds, find_candidates};
 use super::conditions::released;
 use super::turning::Turning;
 use crate::error::Result;
@@ -42,7 +42,7 @@ pub(super) fn start_back<T: Real>(
     // M a = f + Gᵀ λ with G a + γ = 0 on the contacts that press.
     let turns = !run.constraints.is_affine();
     if turns {
-        run.constraints.search(&tape.start.motion, run.scheme.ahead() * h, &mut run.g)?;
+        find_candidates(run, (&tape.start.motion, h), &tape.start.contacts.ids)?;
     }
     let Simulation { parts, constraints, g, .. } = run;
     let contacts = &tape.start.contacts;
@@ -77,8 +77,8 @@ pub(super) fn start_back<T: Real>(
         turned = turns.then_some((rows, closed));
     }
     if let Some((rows, closed)) = turned {
-        let forces = rows.iter().map(|&row| contacts.lambda[row]).collect();
-        let change = Change::of_accelerations(rows, forces);
+        let multipliers = rows.iter().map(|&row| contacts.lambda[row]).collect();
+        let change = Change { rows, multipliers, ..Change::new(0, 2) };
         let solved = Motion {
             v: tape.start.velocity().to_vec(),
             a: tape.start.acceleration().to_vec(),

@@ -24,6 +24,10 @@ pub(super) fn check<T: Real>(run: &mut Simulation<'_, T>) -> Result<StartingPast
             return refuse(format!("the corrector {}", corrector.name()), reason);
         }
     }
+    if run.constraints.offsets.overclosures().is_some() {
+        let reason = "gaps depend on the initial positions: place the bodies so that they touch";
+        return refuse("overlaps at the start that gaps leave out".into(), reason);
+    }
     let at_velocities =
         |stage: &CompiledStage<T>| stage.contact.as_ref().is_some_and(|contact| contact.forecast.is_some());
     if !run.constraints.is_affine() && run.compiled.program.stages.iter().any(at_velocities) {

@@ -77,7 +77,7 @@ impl<T: Real> Simulation<'_, T> {
             sliding_at_start.clone_from(&trial.sliding);
         }
         if let Some(tape) = &mut work.tape {
-            tape.stages.clear();
+            tape.begin_step();
         }
         // An attempt that failed within its corrections has left them.
         if let Some(changes) = &mut work.correction.buffers.changes {

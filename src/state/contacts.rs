@@ -2,6 +2,7 @@
 
 use crate::contact::{ContactId, Tangents};
 use crate::real::Real;
+use crate::rounding::half_digits;
 
 /// Status of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -276,6 +277,11 @@ impl<T: Real> ContactState<T> {
     pub fn dissipated(&self) -> &[T] {
         &self.dissipated
     }
+}
+
+/// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
+pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
+    friction >= (T::one() - half_digits::<T>()) * bound.max(T::zero())
 }
 
 #[cfg(test)]

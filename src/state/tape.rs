@@ -1,9 +1,8 @@
 //! The tape of a run: what each stage leaves for the gradient. Empty boxes in runs that are not recorded.
 
-use super::{History, Motion, State};
+use super::{History, Motion, State, slides};
 use crate::contact::{ContactId, ContactJacobian, ContactLaw};
 use crate::real::Real;
-use crate::rounding::half_digits;
 use std::sync::Arc;
 
 /// The records of the steps since the start of a run.
@@ -17,11 +16,12 @@ pub(crate) struct Tape<T> {
     pub(crate) steps: Vec<StepRecord<T>>,
     /// Only these instead of the steps, if memory is to be saved.
     pub(crate) checkpoints: Option<Checkpoints<T>>,
-    /// The stages of the step that is being tried.
-    pub(crate) stages: Vec<StageRecord<T>>,
+    /// The stages of the step that is being tried, and why it has no derivative.
+    stages: Vec<StageRecord<T>>,
+    refused: Option<NoDerivative>,
     /// The rows recorded last, and their version.
     rows: Option<(u64, Arc<ContactJacobian<T>>)>,
-    pub(crate) refusal: Option<Refusal>,
+    pub(crate) refusal: Option<NoDerivative>,
 }
 
 /// States from which the steps between them are taken again. There are at most twice as many as steps between two.
@@ -69,8 +69,8 @@ pub(crate) enum StartingPast {
 }
 
 /// Something that happened in a run and has no derivative.
-#[derive(Clone, Debug)]
-pub(crate) struct Refusal {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoDerivative {
     pub(crate) what: &'static str,
     pub(crate) reason: &'static str,
 }
@@ -175,11 +175,6 @@ fn across<T: Real>(friction: &[T], k: usize, c: T) -> [T; 2] {
     [entry(0), entry(1)]
 }
 
-/// Whether a friction of this magnitude is sliding friction: μ times the normal force, up to rounding.
-pub(crate) fn slides<T: Real>(friction: T, bound: T) -> bool {
-    friction >= (T::one() - half_digits::<T>()) * bound.max(T::zero())
-}
-
 /// A row that carried a force. Tangential rows follow the row of their contact.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held<T> {
@@ -225,15 +220,15 @@ pub(crate) struct Change<T> {
 }
 
 impl<T: Real> Change<T> {
-    /// Forces along closed rows.
-    pub(crate) fn of_accelerations(rows: Vec<usize>, multipliers: Vec<T>) -> Self {
+    /// A change without rows.
+    pub(crate) fn new(state: usize, field: usize) -> Self {
         Self {
-            state: 0,
-            field: 2,
-            rules: vec![Rule::Closed; rows.len()],
-            totals: multipliers.clone(),
-            rows,
-            multipliers,
+            state,
+            field,
+            rows: Vec::new(),
+            rules: Vec::new(),
+            multipliers: Vec::new(),
+            totals: Vec::new(),
             share: T::zero(),
             force: T::zero(),
             impulse: T::zero(),
@@ -248,7 +243,7 @@ pub(crate) struct Changes<T> {
     pub(crate) list: Vec<Change<T>>,
     /// The jumps of v and a that are solved, and not removed yet.
     pub(crate) solved: [Option<Change<T>>; 2],
-    pub(crate) refusal: Option<Refusal>,
+    pub(crate) refusal: Option<NoDerivative>,
 }
 
 impl<T: Real> Changes<T> {
@@ -262,23 +257,30 @@ impl<T: Real> Changes<T> {
         let tangential = own.take_while(|(rule, _)| matches!(rule, Rule::Slides { normal: at, .. } if *at == normal));
         tangential.fold(T::zero(), |size, (_, &total)| size.hypot(total))
     }
-
-    /// Refuses a gradient of this run, for the first reason given.
-    pub(crate) fn refuse(&mut self, what: &'static str, reason: &'static str) {
-        self.refusal.get_or_insert(Refusal { what, reason });
-    }
 }
 
 impl<T: Real> Tape<T> {
     /// An empty tape.
     pub(crate) fn new(start: State<T>, held: Vec<usize>, past: StartingPast) -> Self {
         let (steps, stages) = (Vec::new(), Vec::new());
-        Self { start, held, past, steps, checkpoints: None, stages, rows: None, refusal: None }
+        Self { start, held, past, steps, checkpoints: None, stages, refused: None, rows: None, refusal: None }
+    }
+
+    /// Forgets the stages of an attempt that was undone.
+    pub(crate) fn begin_step(&mut self) {
+        self.stages.clear();
+        self.refused = None;
+    }
+
+    /// Adds a solved stage of the step that is being tried, or why it has no derivative.
+    pub(crate) fn push(&mut self, stage: StageRecord<T>, refused: Option<NoDerivative>) {
+        self.stages.push(stage);
+        self.refused = self.refused.take().or(refused);
     }
 
     /// Refuses a gradient of this run, for the first reason given.
     pub(crate) fn refuse(&mut self, what: &'static str, reason: &'static str) {
-        self.refusal.get_or_insert(Refusal { what, reason });
+        self.refusal.get_or_insert(NoDerivative { what, reason });
     }
 
     /// A copy of the rows, shared by all stages with the same version.
@@ -299,14 +301,15 @@ impl<T: Real> Tape<T> {
             stage.changes.append(&mut changes.list);
             stage.solved = solved.cloned();
         }
-        if let Some(Refusal { what, reason }) = changes.refusal.take() {
-            self.refuse(what, reason);
-        }
+        let refused = changes.refusal.take();
+        self.refused = self.refused.take().or(refused);
     }
 
     /// Makes the stages recorded last an accepted step, which ends with a state and a history.
     pub(crate) fn end_step(&mut self, (starts, extrapolates): (bool, bool), state: &State<T>, history: &History<T>) {
         let (stages, h) = (std::mem::take(&mut self.stages), history.made_with);
+        let refused = self.refused.take();
+        self.refusal = self.refusal.take().or(refused);
         match &mut self.checkpoints {
             Some(checkpoints) => checkpoints.push(h, state, history),
             None => self.steps.push(StepRecord { h, starts, stages, state: state.clone(), extrapolates }),

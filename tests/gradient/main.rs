@@ -2,6 +2,7 @@
 
 mod closed_forms;
 mod many;
+mod meshes;
 mod refused;
 mod scenes;
 mod throw;

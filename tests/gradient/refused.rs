@@ -1,12 +1,12 @@
 //! Runs that have no gradient, or none yet, are refused by name.
 
-use contact_dynamics::contact::{Side, Sphere};
+use contact_dynamics::contact::{Candidates, Contacts, Side, Sphere, Variation};
 use contact_dynamics::corrector::ZeroAcceleration;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::gradient::{Gradient, RecordedStep, Seed};
 use contact_dynamics::{
-    CdLagrange, Composite, ContactLaw, Error, GeneralizedAlpha, LinearRows, LinearSystem, Lu, Newmark, NodesOnObstacle,
-    Result, Simulation, SimulationBuilder, TimeIntegrator,
+    CdLagrange, Composite, ContactConstraint, ContactLaw, Error, GeneralizedAlpha, InitialOverclosure, LinearRows,
+    LinearSystem, Lu, Newmark, NodesOnObstacle, Result, Simulation, SimulationBuilder, StepControl, TimeIntegrator,
 };
 
 fn zero(_: &RecordedStep<'_, f64>, _: &mut Seed<'_, f64>) -> f64 {
@@ -94,4 +94,63 @@ fn events_without_derivative_are_refused_by_the_gradient() {
     run.record().unwrap();
     run.restart().unwrap();
     assert_refused(gradient(&mut run), "a restart");
+}
+
+/// A floor that is looked for from some time on: what has passed it by then is found inside, and comes out slowly.
+struct LateFloor(bool);
+
+impl ContactConstraint<f64> for LateFloor {
+    fn dofs(&self) -> &[usize] {
+        &[0]
+    }
+    fn contacts(&self, contacts: &mut Contacts<f64>) {
+        if self.0 {
+            contacts.push((0, 0), ContactLaw::Rigid, &[(0, 1.0)]).recovery(1e-3);
+        }
+    }
+    fn gaps(&mut self, _: f64, u: &[f64], gaps: &mut [f64]) -> Result<()> {
+        gaps[0] = u[0] + 0.05;
+        Ok(())
+    }
+    fn search(&mut self, t: f64, _: &[f64], _: &[f64], _: f64) -> Result<Candidates> {
+        let found = t >= 0.1;
+        Ok(Candidates::changed_if(std::mem::replace(&mut self.0, found) != found))
+    }
+    fn variation(&self) -> Variation {
+        Variation::BySearch
+    }
+}
+
+#[test]
+fn penetration_that_comes_out_slowly_is_refused() {
+    let mut run = builder(system([1.0; 3])).constraint(LateFloor(false)).build().unwrap();
+    run.record().unwrap();
+    run.run_until(0.09, &mut ()).unwrap();
+    assert!(gradient(&mut run).is_ok());
+    run.run_until(0.12, &mut ()).unwrap();
+    assert_refused(gradient(&mut run), "penetration");
+}
+
+#[test]
+fn overlaps_at_the_start_are_refused() {
+    let overlapping = LinearRows::new().unilateral(&[(0, 1.0)], -0.01);
+    let builder =
+        builder(system([1.0; 3])).initial_overclosure(InitialOverclosure::AdjustedGaps).constraint(overlapping);
+    assert_refused(builder.build().unwrap().record(), "overlaps");
+}
+
+/// What happens in an attempt that is undone has no derivative and needs none.
+#[test]
+fn attempts_that_are_undone_refuse_nothing() {
+    let law = ContactLaw::AugmentedLagrangian { stiffness: 1e3, augmentations: 3 };
+    let contacts = LinearRows::new().row(law, &[(0, 1.0)], 0.0053).unilateral(&[(0, 1.0)], 0.0054);
+    let contacts = contacts.unilateral(&[(0, 1.0)], 0.0054);
+    let control = StepControl::halving(0.01 / 8.0).unwrap().contact_changes(1).unwrap();
+    let trapezoidal =
+        Simulation::builder(system([1.0; 3]), Newmark::trapezoidal(), 0.01).velocity(vec![-1.0, 0.0, 0.0]);
+    let mut run = trapezoidal.step_control(control).constraint(contacts).build().unwrap();
+    run.record().unwrap();
+    run.step().unwrap();
+    assert!(run.step_size() < 0.006, "contacts close in the first attempt");
+    assert!(gradient(&mut run).is_ok());
 }

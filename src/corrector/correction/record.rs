@@ -3,7 +3,7 @@
 use super::Correction;
 use crate::corrector::JumpProblem;
 use crate::real::Real;
-use crate::state::{Change, Rule};
+use crate::state::{Change, NoDerivative, Rule};
 
 impl<T: Real> Correction<'_, T> {
     /// Records the solved jumps of field 1 or 2 (v or a); raw multipliers contribute `share` to the totals.
@@ -49,18 +49,7 @@ impl<T: Real> Correction<'_, T> {
         let Self { buffers, constraints, .. } = self;
         let JumpProblem { blocks, rows, totals, increments, left, .. } = &*buffers.problem;
         let impulse = |row: usize| buffers.changes.as_ref().map_or(T::zero(), |changes| changes.impulse(row));
-        let mut change = Change {
-            state,
-            field,
-            rows: Vec::new(),
-            rules: Vec::new(),
-            multipliers: Vec::new(),
-            totals: Vec::new(),
-            share: T::zero(),
-            force: T::zero(),
-            impulse: T::zero(),
-            damps: false,
-        };
+        let mut change = Change::new(state, field);
         for block in blocks {
             let (normal, total) = (change.rows.len(), totals[block.place]);
             let closes = block.set.is_bilateral() || total != T::zero();
@@ -90,7 +79,7 @@ impl<T: Real> Correction<'_, T> {
     /// Records that this run has no gradient.
     pub(super) fn refuse_gradient(&mut self, what: &'static str, reason: &'static str) {
         if let Some(changes) = &mut self.buffers.changes {
-            changes.refuse(what, reason);
+            changes.refusal.get_or_insert(NoDerivative { what, reason });
         }
     }
 }

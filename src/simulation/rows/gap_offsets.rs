@@ -88,6 +88,11 @@ impl<T: Real> GapOffsets<T> {
         self.overclosures.as_ref()
     }
 
+    /// Whether the present step leaves a part of the penetration of a row.
+    pub(crate) fn keeps(&self, row: usize) -> bool {
+        self.kept.get(row).is_some_and(|&kept| kept > T::zero())
+    }
+
     /// Converts gaps of a state to the offset gaps that the current step measures.
     pub(crate) fn add_kept(&self, gaps: &mut [T]) {
         for (gap, &kept) in gaps.iter_mut().zip(&self.kept).filter(|(_, kept)| **kept > T::zero()) {

@@ -7,7 +7,7 @@ use crate::real::Real;
 use crate::rounding::half_digits;
 use crate::simulation::rows::slip::{Source, source};
 use crate::simulation::stage::StageSolve;
-use crate::state::{Compliance, Held, Motion, Rule, StageRecord, Tape};
+use crate::state::{Compliance, Held, Motion, NoDerivative, Rule, StageRecord, Tape};
 use std::sync::Arc;
 
 impl<T: Real> StageSolve<'_, '_, T> {
@@ -16,7 +16,10 @@ impl<T: Real> StageSolve<'_, '_, T> {
     pub(super) fn record(&mut self, tape: &mut Tape<T>, d: Option<&[T]>, impulse: T) -> Result<()> {
         let balance = self.balance(d.unwrap_or(&self.vectors.increment));
         let mut readings = Vec::new();
-        let mut held = Vec::new();
+        let (mut held, mut refused) = (Vec::new(), None);
+        let mut refuse = |what, reason| {
+            refused.get_or_insert(NoDerivative { what, reason });
+        };
         for row in 0..self.constraints.len() {
             let (law, force) = (self.constraints.law(row), self.contact.trial.lambda_raw[row]);
             if force == T::zero() && !law.is_equality() {
@@ -35,12 +38,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
                     Some(compliance(law, [gap, rate + self.g.product(row, &balance.v)], force))
                 }
                 _ => {
-                    tape.refuse("this contact law", "its derivative is not implemented");
+                    refuse("this contact law", "its derivative is not implemented");
                     continue;
                 }
             };
             if compliance.is_some_and(|known: Compliance<T>| known.lag != T::zero()) && !self.constraints.is_affine() {
-                tape.refuse("damped contact along rows that turn", "its derivative is not implemented");
+                refuse("damped contact along rows that turn", "its derivative is not implemented");
             }
             let id = self.constraints.ids[row];
             let (normal, rule) = (held.len(), Rule::Closed);
@@ -52,13 +55,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 held.push(Held { row, id, rule, force: raw[row], is_slip: true, compliance: None });
             }
         }
+        if held.iter().any(|held: &Held<T>| self.constraints.offsets.keeps(held.row)) {
+            refuse("penetration that is not recovered in one step", "its derivative is not implemented");
+        }
         let rows = tape.rows(self.g, self.constraints.version());
         let curved = &self.contact.rows.curved;
         let forces = if curved.apart { Arc::new(curved.forces(self.g).clone()) } else { Arc::clone(&rows) };
         if !self.constraints.is_affine() && held.iter().any(|held: &Held<T>| held.is_slip) {
-            tape.refuse("friction along rows that turn", "its derivative is not implemented");
+            refuse("friction along rows that turn", "its derivative is not implemented");
         }
-        tape.stages.push(StageRecord { balance, rows, forces, held, impulse, changes: Vec::new(), solved: None });
+        let stage = StageRecord { balance, rows, forces, held, impulse, changes: Vec::new(), solved: None };
+        tape.push(stage, refused);
         Ok(())
     }
 
