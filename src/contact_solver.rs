@@ -60,7 +60,8 @@ pub(crate) const MANY: usize = 256;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Assembly {
-    /// Whichever is less work, counted from the sizes of the problem; if the iteration does not converge, W is formed.
+    /// Whichever is less work, counted from the sizes of the problem; never if the linear solver iterates. If the
+    /// iteration does not converge, W is formed.
     #[default]
     Automatic,
     /// Always.

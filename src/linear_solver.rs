@@ -126,7 +126,8 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
     /// The factorization as a static condensation onto the dofs given as `last`, if the solver offers it.
     ///
     /// With it a step in contact costs one forward and one backward sweep, as without contact, plus work on the
-    /// interface only. Without it contact needs full solves: one for each pressed contact, and one more per step.
+    /// interface only. Without it contact needs full solves: one for each pressed contact, and one more per step; or,
+    /// if the solver iterates on symmetric matrices, products with A instead.
     fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
         None
     }

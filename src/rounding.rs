@@ -81,6 +81,11 @@ pub(crate) fn projected_residual<T: Float>() -> T {
     number::<T>(1e-12).max(number::<T>(8.0) * T::epsilon())
 }
 
+/// The same for the first problem of rows that turn, whose rows differ from those of the solution by more; and for a
+/// later one, over the largest difference between its rows and those of the solution before.
+pub(crate) const FIRST_RESIDUAL: f64 = 1e-4;
+pub(crate) const RESIDUAL_BY_MISS: f64 = 1e-3;
+
 /// Gaps below this have lost their digits, as of motions that have died out: they need no solve. A length.
 pub(crate) fn smallest_gap<T: Float>() -> T {
     T::min_positive_value() / T::epsilon()

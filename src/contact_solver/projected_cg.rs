@@ -21,7 +21,6 @@ use crate::dense::dot;
 use crate::error::Result;
 use crate::memory;
 use crate::real::Real;
-use crate::rounding::projected_residual;
 use metric::Metric;
 use rows::Rows;
 use statuses::Statuses;
@@ -29,8 +28,9 @@ use statuses::Statuses;
 /// What memory is asked for.
 const WHAT: &str = "a contact problem without W";
 
-/// Writes A x to its second argument, with x its first.
-type Product<'a, T> = &'a mut dyn FnMut(&[T], &mut [T]);
+/// Writes A x to its last argument. x is zero farther from the dofs of the rows than its first argument, the number of
+/// products with which it can get there.
+type Product<'a, T> = &'a mut dyn FnMut(usize, &[T], &mut [T]);
 
 /// A contact problem given by A and G: y = G x + c λ + q with A x = Gᵀ λ.
 pub(crate) struct SparseProblem<'a, T> {
@@ -49,6 +49,8 @@ pub(crate) struct Patience {
     pub(crate) products: usize,
     /// How often statuses may be decided.
     pub(crate) looks: usize,
+    /// The residual at which the iteration ends, relative to the contact forces.
+    pub(crate) residual: f64,
 }
 
 /// The rows: c, q and the rounding of y of each row, and the set of each block.
@@ -88,6 +90,8 @@ pub(crate) struct ProjectedCg<T> {
     residual: Vec<T>,
     direction: Vec<T>,
     product: Vec<T>,
+    /// How far x reaches from the dofs of the rows.
+    reach: usize,
     is_begun: bool,
 }
 
@@ -156,6 +160,7 @@ impl<T: Real> ProjectedCg<T> {
         }
         memory::copy(&mut self.inverse, problem.inverse, WHAT)?;
         memory::make_room(&mut self.inverse, problem.data.rows.len(), WHAT)?;
+        self.reach = 0;
         self.x.clear();
         for values in [&mut self.x, &mut self.residual, &mut self.direction, &mut self.product] {
             memory::grow(values, size, 1, WHAT)?;
@@ -183,7 +188,7 @@ impl<T: Real> ProjectedCg<T> {
                 return End::GivenUp;
             }
             let left = square.sqrt();
-            let goal = projected_residual::<T>() * *scale;
+            let goal = T::of(problem.patience.residual) * *scale;
             outcome.residual = ratio(left, *scale);
             if left <= goal.max(T::of(LOOK) * *looked.get_or_insert(left)) {
                 looked = Some(left);
@@ -207,8 +212,8 @@ impl<T: Real> ProjectedCg<T> {
 
     /// Evaluates the residual Gᵀλ − A x, and projects it.
     fn balance(&mut self, problem: &mut SparseProblem<'_, T>) {
-        let Self { rows, metric, statuses, inverse, x, residual, .. } = self;
-        multiply(problem, inverse, x, residual);
+        let Self { rows, metric, statuses, inverse, x, residual, reach, .. } = self;
+        multiply(problem, *reach, inverse, (x, residual));
         for r in residual.iter_mut() {
             *r = -*r;
         }
@@ -234,8 +239,9 @@ impl<T: Real> ProjectedCg<T> {
         for ((p, &r), &inverse) in self.direction.iter_mut().zip(&self.residual).zip(&self.inverse) {
             *p = inverse * r + if share > T::zero() { share * *p } else { T::zero() };
         }
-        let Self { rows, metric, statuses, inverse, x, residual, direction, product, .. } = self;
-        multiply(problem, inverse, direction, product);
+        let Self { rows, metric, statuses, inverse, x, residual, direction, product, reach, .. } = self;
+        *reach += 1;
+        multiply(problem, *reach, inverse, (direction, product));
         let curvature = dot(direction, product);
         let sound = curvature > T::zero();
         if sound {
@@ -257,9 +263,9 @@ enum End {
 }
 
 /// `y = A x`. A compliant row has the stiffness 1/c.
-fn multiply<T: Real>(problem: &mut SparseProblem<'_, T>, inverse: &[T], x: &[T], y: &mut [T]) {
+fn multiply<T: Real>(problem: &mut SparseProblem<'_, T>, reach: usize, inverse: &[T], (x, y): (&[T], &mut [T])) {
     let dofs = problem.inverse.len();
-    (problem.product)(&x[..dofs], &mut y[..dofs]);
+    (problem.product)(reach, &x[..dofs], &mut y[..dofs]);
     for ((y, &x), &c) in y[dofs..].iter_mut().zip(&x[dofs..]).zip(&inverse[dofs..]) {
         *y = if c > T::zero() { x / c } else { T::zero() };
     }

@@ -8,7 +8,7 @@ use crate::contact_solver::{AdmissibleSet, Patience, ProjectedCg, RowData, Spars
 use crate::error::Result;
 use crate::memory;
 use crate::real::Real;
-use crate::rounding::rounding;
+use crate::rounding::{projected_residual, rounding};
 
 /// Memory for one group, with one entry per row or block.
 #[derive(Debug, Default)]
@@ -119,13 +119,13 @@ impl<T: Real> ManyJumps<T> {
         if !T::all_finite(offset) || !T::all_finite(compliance) {
             return Ok(false);
         }
-        let mut product = |x: &[T], y: &mut [T]| {
+        let mut product = |_: usize, x: &[T], y: &mut [T]| {
             for ((y, &x), &inverse) in y.iter_mut().zip(x).zip(inverse) {
                 *y = if inverse > T::zero() { x / inverse } else { T::zero() };
             }
         };
         let data = RowData { g, rows, compliance, offset, tolerance, sets, along };
-        let patience = Patience { products: 2 * LOOKS, looks: LOOKS };
+        let patience = Patience { products: 2 * LOOKS, looks: LOOKS, residual: projected_residual::<T>().value() };
         cg.begin();
         let outcome = cg.solve(&mut SparseProblem { product: &mut product, inverse, data, patience }, multipliers)?;
         Ok(outcome.is_solved)

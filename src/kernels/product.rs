@@ -133,6 +133,8 @@ pub struct LowerColumns<'a, T> {
     pub supervariables: &'a [Supervariable],
     /// The first rows of the groups of all supervariables of the matrix.
     pub groups: &'a [u32],
+    /// Supervariables of higher levels are left out. All are multiplied if there are no levels.
+    pub levels: (&'a [u8], u8),
 }
 
 /// `y += c A x` for the entries of a symmetric A in these columns, at and below the diagonal, and their mirror
@@ -154,12 +156,16 @@ impl<T: Scalar> WithSimd for LowerProduct<'_, T> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, _: S) {
-        let LowerColumns { supervariables, groups, .. } = self.columns;
+        let LowerColumns { supervariables, groups, levels: (levels, highest), .. } = self.columns;
         let start = supervariables[0].column as usize;
         let mut at = 0;
-        for pair in supervariables.windows(2) {
+        for (number, pair) in supervariables.windows(2).enumerate() {
             let Supervariable { column, width, group, first } = pair[0];
             let (column, groups) = (column as usize, &groups[first as usize..pair[1].first as usize]);
+            if levels.get(number).is_some_and(|level| *level > highest) {
+                at += pair[0].entries(groups.len());
+                continue;
+            }
             match (width, group) {
                 (3, 3) => self.supervariable::<3, 3>(column, groups, [start, at]),
                 (2, 2) => self.supervariable::<2, 2>(column, groups, [start, at]),

@@ -29,8 +29,9 @@ use std::ops::Range;
 /// the [`tolerance`](Self::tolerance), or when updates become too small for the scalar to resolve, as they always do
 /// in `f32` with the default tolerance.
 ///
-/// It offers no [`condensation`](Factorization::condensation): contact needs a full solve for each pressed row (kept
-/// while rows and matrix are unchanged) and one more per step. For hundreds of moving contacts use a factorization.
+/// It offers no [`condensation`](Factorization::condensation): contact is solved by products with A, however few rows
+/// press. With [`Assembly::Always`](crate::contact_solver::Assembly::Always) it takes a full solve for each pressed row
+/// (kept while rows and matrix are unchanged) and one more per step.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

@@ -181,7 +181,7 @@ impl<T: Real> Operator<T> {
     /// Finishes the solve of [`begin`](Self::begin): `increment` becomes d on all dofs. `forces` are the contact
     /// forces on the interface, `on_interface` is d there with them.
     pub(crate) fn finish(&mut self, increment: &mut [T], on_interface: &[T], forces: &[T]) -> Result<()> {
-        let Self { contact, factor, interface, full, .. } = self;
+        let Self { contact, factor, interface, full, products, .. } = self;
         if let Some(condensed) = condensation(*contact, &mut **factor).filter(|_| !on_interface.is_empty()) {
             condensed.expand(on_interface, increment)?;
         } else if *contact == ContactPath::Apart {
@@ -189,13 +189,17 @@ impl<T: Real> Operator<T> {
                 increment[dof] = x;
             }
         } else if forces.iter().any(|force| *force != T::zero()) {
-            let column = &mut full[..increment.len()];
-            column.fill(T::zero());
-            for (&force, &dof) in forces.iter().zip(interface.iter()) {
-                column[dof] = force;
+            if let Some(known) = products.as_ref().and_then(|products| products.response_to(forces)) {
+                T::axpy(T::one(), known, increment);
+            } else {
+                let column = &mut full[..increment.len()];
+                column.fill(T::zero());
+                for (&force, &dof) in forces.iter().zip(interface.iter()) {
+                    column[dof] = force;
+                }
+                factor.solve(column)?;
+                T::axpy(T::one(), column, increment);
             }
-            factor.solve(column)?;
-            T::axpy(T::one(), column, increment);
             for (&x, &dof) in on_interface.iter().zip(interface.iter()) {
                 increment[dof] = x;
             }
@@ -336,18 +340,24 @@ impl<T: Real> Operator<T> {
     /// Whether problems of so many rows may be solved by products with A.
     pub(crate) fn multiplies(&self, assembly: Assembly, rows: usize) -> bool {
         let may = self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric();
-        may && rows >= assembly.least()
+        let few = assembly == Assembly::Automatic && self.iterates();
+        may && rows >= if few { 1 } else { assembly.least() }
     }
 
-    /// Solves a contact problem by products with A, unless forming W is less work or the only way. Leaves the forces
-    /// Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
+    /// Whether solves iterate: then a response to a row costs as much as a whole contact problem by products.
+    fn iterates(&self) -> bool {
+        self.factor.iterations() > 0
+    }
+
+    /// Solves a contact problem by products with A, to a residual, unless forming W is less work or the only way. Leaves
+    /// the forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
     pub(crate) fn solve_by_products(
         &mut self,
         (system, h, at): (&mut dyn System<T>, f64, At<'_, T>),
-        assembly: Assembly,
+        (assembly, residual): (Assembly, f64),
         data: RowData<'_, T>,
         multipliers: &mut [T],
-        [forces, response]: [&mut [T]; 2],
+        answer: [&mut [T]; 2],
     ) -> Result<Option<Outcome>> {
         let RowData { g, rows, .. } = data;
         let responds = |&row: &usize| g.located(row).next().is_some();
@@ -355,10 +365,10 @@ impl<T: Real> Operator<T> {
             return Ok(None);
         }
         self.read_products(system, h, at)?;
-        let responses = self.work_of_responses(rows.len());
+        let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
-        if assembly == Assembly::Automatic {
+        if assembly == Assembly::Automatic && !iterates {
             let entries = rows.iter().map(|&row| g.located(row).count()).sum();
             let with_w = responses + self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
             match products.affordable(entries, with_w) {
@@ -366,18 +376,9 @@ impl<T: Real> Operator<T> {
                 None => return Ok(None),
             }
         }
-        let outcome = products.solve((&self.matrix, system), data, multipliers, affordable)?;
-        if outcome.is_solved {
-            forces.fill(T::zero());
-            for (&row, &lambda) in rows.iter().zip(&*multipliers) {
-                g.interface_scatter(row, lambda, forces);
-            }
-            let solution = products.response();
-            for (response, &dof) in response.iter_mut().zip(&self.interface) {
-                *response = solution[dof];
-            }
-        }
-        Ok(Some(outcome))
+        products
+            .solve((&self.matrix, system, &self.interface), data, multipliers, (affordable, residual), answer)
+            .map(Some)
     }
 
     /// Multiplications for the responses to some rows, if the matrix changes too often to keep them.
@@ -400,7 +401,7 @@ impl<T: Real> Operator<T> {
         let matrix = &self.matrix;
         let products = match &mut self.products {
             Some(products) => products,
-            none => none.insert(Box::new(Products::new(matrix, system)?)),
+            none => none.insert(Box::new(Products::new(matrix, system, &self.interface)?)),
         };
         products.read(matrix, system, h)?;
         if products.is_packed && !self.varies() {
@@ -428,7 +429,7 @@ impl<T: Real> Operator<T> {
     /// Forgets results computed with another matrix.
     fn reset(&mut self) {
         if let Some(products) = &mut self.products {
-            products.is_current = false;
+            products.forget();
         }
         self.responses.reset();
         self.diagonal.reciprocals.clear();

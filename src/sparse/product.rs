@@ -71,10 +71,29 @@ impl<T: Real> Product<T> {
         }
     }
 
-    /// `y = A x` with packed entries.
-    pub(crate) fn write_packed(&mut self, x: &[T], y: &mut [T]) {
+    /// `y = A x` with packed entries, for x that is zero farther than `distance` from the dofs of the last
+    /// [`measure`](Self::measure).
+    pub(crate) fn write_packed(&mut self, distance: usize, x: &[T], y: &mut [T]) {
         if let Self::Supervariables(supervariables) = self {
+            supervariables.highest = u8::try_from(distance + 1).unwrap_or(FAR);
             supervariables.multiply(T::one(), None, x, y, Accumulate::Replace);
+            supervariables.highest = FAR;
+        }
+    }
+
+    /// Measures how far dofs are from some of them: by how many products x gets there that is zero elsewhere.
+    pub(crate) fn measure(&mut self, dofs: &[usize]) -> Result<()> {
+        match self {
+            Self::Supervariables(supervariables) => supervariables.measure(dofs),
+            Self::General | Self::Rows | Self::Tridiagonal { .. } => Ok(()),
+        }
+    }
+
+    /// The share of the entries that products read of which each reaches one dof farther, on average over `count`.
+    pub(crate) fn mean_share(&self, count: usize) -> f64 {
+        match self {
+            Self::Supervariables(supervariables) => supervariables.mean_share(count),
+            Self::General | Self::Rows | Self::Tridiagonal { .. } => 1.0,
         }
     }
 
@@ -122,7 +141,14 @@ pub(crate) struct Supervariables<T> {
     parts: Vec<Part<T>>,
     /// The entries at and below the diagonal, if they have been packed.
     packed: Vec<T>,
+    /// The distance of each supervariable from some dofs; empty if it was not measured.
+    levels: Vec<u8>,
+    /// Supervariables of higher levels are not multiplied.
+    highest: u8,
 }
+
+/// The level of what is too far to be counted.
+const FAR: u8 = u8::MAX;
 
 /// Columns that one thread multiplies.
 #[derive(Debug)]
@@ -184,7 +210,7 @@ impl<T: Real> Supervariables<T> {
         all.shrink_to_fit();
         groups.shrink_to_fit();
         let parts = Self::parts(pattern, &all)?;
-        Ok(Some(Self { all, groups, parts, packed: Vec::new() }))
+        Ok(Some(Self { all, groups, parts, packed: Vec::new(), levels: Vec::new(), highest: FAR }))
     }
 
     /// Parts with similar numbers of entries; a single one if they would contribute to many rows of each other.
@@ -237,8 +263,56 @@ impl<T: Real> Supervariables<T> {
         Ok(())
     }
 
+    fn measure(&mut self, dofs: &[usize]) -> Result<()> {
+        const WHAT: &str = "the distances from contact";
+        let Self { all, groups, levels, .. } = self;
+        // The supervariable of each column.
+        let mut owners: Vec<usize> = memory::reserve(all[all.len() - 1].column as usize, 1, WHAT)?;
+        owners.extend(all.iter().enumerate().flat_map(|(own, found)| std::iter::repeat_n(own, found.width.into())));
+        levels.clear();
+        memory::grow(levels, all.len() - 1, 1, WHAT)?;
+        levels.fill(FAR);
+        for &dof in dofs {
+            levels[owners[dof]] = 0;
+        }
+        for level in 0..FAR - 1 {
+            let mut grows = false;
+            for (own, pair) in all.windows(2).enumerate() {
+                let others = groups[pair[0].first as usize..pair[1].first as usize].iter();
+                let mut others = others.map(|&row| owners[row as usize]);
+                if levels[own] == level {
+                    for other in others {
+                        let found = &mut levels[other];
+                        if *found == FAR {
+                            (*found, grows) = (level + 1, true);
+                        }
+                    }
+                } else if levels[own] == FAR && others.any(|other| levels[other] == level) {
+                    (levels[own], grows) = (level + 1, true);
+                }
+            }
+            if !grows {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn mean_share(&self, count: usize) -> f64 {
+        let Self { all, levels, .. } = self;
+        let (mut read, mut whole) = (0, 0);
+        for (at, pair) in all.windows(2).enumerate() {
+            let entries = pair[0].entries((pair[1].first - pair[0].first) as usize);
+            let level = levels.get(at).map_or(0, |&level| usize::from(level));
+            whole += count * entries;
+            // The product number k, from 0 on, reads the levels up to k + 1.
+            read += count.saturating_sub(level.saturating_sub(1)) * entries;
+        }
+        if whole > 0 { read as f64 / whole as f64 } else { 1.0 }
+    }
+
     fn multiply(&mut self, c: T, a: Option<SparseColMatRef<'_, usize, T>>, x: &[T], y: &mut [T], put: Accumulate) {
-        let Self { all, groups, parts, packed } = self;
+        let Self { all, groups, parts, packed, levels, highest } = self;
         let entries = |part: &Part<T>| match a.filter(|_| packed.is_empty()) {
             Some(a) => LowerEntries::Matrix(a),
             None => LowerEntries::Packed(packed.get(part.packed..).unwrap_or(&[])),
@@ -247,6 +321,7 @@ impl<T: Real> Supervariables<T> {
             entries: entries(part),
             supervariables: &all[part.supervariables.start..=part.supervariables.end],
             groups,
+            levels: (levels.get(part.supervariables.clone()).unwrap_or(&[]), *highest),
         };
         if let [part] = &parts[..] {
             if put == Accumulate::Replace {
@@ -315,7 +390,7 @@ mod tests {
         product.write(-2.0, a, &x, &mut written);
         let mut packed = vec![f64::NAN; n];
         if product.pack(a).unwrap() {
-            product.write_packed(&x, &mut packed);
+            product.write_packed(n, &x, &mut packed);
             assert!(
                 packed.iter().zip(&written).all(|(packed, written)| (-2.0 * packed - written).abs() < 1e-14 * n as f64)
             );
@@ -340,6 +415,31 @@ mod tests {
             let mut product = Product::new(a.as_ref(), Symmetry::Symmetric).unwrap();
             assert!(matches!(product, Product::Supervariables(_)), "{dofs:?}");
             check(&a, &mut product);
+        }
+    }
+
+    /// x that is zero beyond a distance from some dofs has the same product if only what is near is multiplied.
+    #[test]
+    fn products_of_what_is_near() {
+        for (nodes, reach) in [(40, 3), (4500, 14)] {
+            let a = matrix(&vec![3; nodes], |p, q| p - q < reach);
+            let a = a.as_ref();
+            let mut product = Product::new(a, Symmetry::Symmetric).unwrap();
+            product.measure(&[3 * (nodes / 2) + 1]).unwrap();
+            assert!(product.pack(a).unwrap());
+            let (mut x, mut near, mut whole) = (vec![0.0; 3 * nodes], vec![f64::NAN; 3 * nodes], vec![0.0; 3 * nodes]);
+            for distance in 0..6 {
+                let nearest = (nodes / 2).saturating_sub(distance * (reach - 1));
+                let farthest = (nodes / 2 + distance * (reach - 1)).min(nodes - 1);
+                x[3 * nearest..3 * farthest + 3].fill(1.0);
+                product.write_packed(distance, &x, &mut near);
+                product.write_packed(nodes, &x, &mut whole);
+                assert_eq!(near, whole, "{nodes} nodes, distance {distance}");
+            }
+            let share = product.mean_share(2);
+            // The first product reads the nodes within one step, the second those within two.
+            let read = (6 * reach - 4) as f64 / (2 * nodes) as f64;
+            assert!((share / read - 1.0).abs() < 0.1, "{share}, {read}");
         }
     }
 

@@ -1,11 +1,11 @@
 //! Contact without the Delassus operator: the same motion and forces as with it, in every kind of problem that it
-//! serves, and an error where it does not end.
+//! serves, beside a factor and beside conjugate gradients, and an error where it does not end.
 
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::contact_solver::Assembly;
 use contact_dynamics::{
-    ActiveSet, Composite, ContactStatus, Error, GeneralizedAlpha, LinearRows, LinearSystem, PersistencyCorrection,
-    Real, Simulation, System, TimeIntegrator,
+    ActiveSet, Automatic, Composite, ConjugateGradients, ContactStatus, Error, GeneralizedAlpha, LinearRows,
+    LinearSolver, LinearSystem, PersistencyCorrection, Real, Simulation, System, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -27,32 +27,42 @@ fn compare<S: System<f64> + 'static>(
 ) -> [usize; 2] {
     let mut most = [0; 2];
     for scheme in SCHEMES {
-        let [mut with_w, mut without] = [Assembly::Always, Assembly::Never].map(|assembly| {
+        let solvers: [(Assembly, Box<dyn LinearSolver<f64>>); 3] = [
+            (Assembly::Always, Box::new(Automatic)),
+            (Assembly::Never, Box::new(Automatic)),
+            (Assembly::Automatic, Box::new(ConjugateGradients::default().tolerance(1e-13).unwrap())),
+        ];
+        let [mut with_w, mut without, mut iterates] = solvers.map(|(assembly, linear_solver)| {
             Simulation::builder(system(), scheme(), size / MATERIAL.wave_speed())
                 .velocity(velocity.to_vec())
                 .constraint(contact())
                 .contact_solver(ActiveSet::default().with_assembly(assembly))
                 .corrector(PersistencyCorrection::with_history_projection())
+                .linear_solver(linear_solver)
                 .build()
                 .unwrap()
         });
         for step in 0..steps {
             with_w.step().unwrap();
-            without.step().unwrap_or_else(|error| panic!("{what}, {}, step {step}: {error}", scheme().name()));
-            let [one, other] = [&with_w, &without].map(Simulation::state);
-            let name = format!("{what}, {}, step {step}", scheme().name());
-            near(&name, one.displacement(), other.displacement(), 1e-8);
-            near(&name, one.velocity(), other.velocity(), 1e-8);
-            // Rows that turn are linearized until forces agree to 1e-7.
-            near(&name, one.contacts().forces(), other.contacts().forces(), 1e-7);
+            let one = with_w.state();
+            for (run, how) in [(&mut without, "factor"), (&mut iterates, "iteration")] {
+                let name = format!("{what}, {}, step {step}, {how}", scheme().name());
+                run.step().unwrap_or_else(|error| panic!("{name}: {error}"));
+                let other = run.state();
+                near(&name, one.displacement(), other.displacement(), 1e-8);
+                near(&name, one.velocity(), other.velocity(), 1e-8);
+                // Rows that turn are linearized until forces agree to 1e-7.
+                near(&name, one.contacts().forces(), other.contacts().forces(), 1e-7);
+            }
             let closed = one.contacts().closed();
             let sliding = |&contact: &usize| one.contacts().status(contact) == ContactStatus::Sliding;
             most[0] = most[0].max(closed.iter().filter(|closed| **closed).count());
             most[1] = most[1].max((0..closed.len()).filter(sliding).count());
         }
-        let [one, other] = [&with_w, &without].map(|run| *run.statistics());
+        let [one, other, third] = [&with_w, &without, &iterates].map(|run| *run.statistics());
         assert!(one.contact_products == 0 && one.contact_iterations > 0, "{what}: {one:?}");
         assert!(other.contact_products > 0 && other.contact_iterations == 0, "{what}: {other:?}");
+        assert!(third.contact_products > 0 && third.contact_iterations == 0, "{what}: {third:?}");
     }
     most
 }

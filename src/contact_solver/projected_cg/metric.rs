@@ -4,6 +4,7 @@ use super::WHAT;
 use super::rows::Rows;
 use super::statuses::{Role, Statuses};
 use crate::contact::RowProducts;
+use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::linear_solver::{Automatic, Factorization, LinearSolver, negligible};
 use crate::memory;
@@ -24,6 +25,9 @@ pub(super) struct Metric<T> {
     /// Whether `values` are of rows linearized elsewhere.
     pub(super) is_near: bool,
     factor: Option<Box<dyn Factorization<T>>>,
+    /// The factor of a few rows, which needs no analysis, and whether it is the present one.
+    dense: Option<DenseCholesky<T>>,
+    is_dense: bool,
     /// The pattern that the factor was analyzed for, and the values that were factorized.
     analyzed: [Vec<usize>; 2],
     factorized: Vec<T>,
@@ -58,6 +62,9 @@ const SHIFT: f64 = 1e-10;
 
 /// The change of a compliance, as a share of the diagonal, from which on N is factorized again.
 const ANOTHER: f64 = 1e-3;
+
+/// Rows up to which N has a dense factor.
+const FEW: usize = 64;
 
 /// Projections of one residual: each reduces what is left by the share that the factor misses.
 const PASSES: usize = 8;
@@ -135,7 +142,7 @@ impl<T: Real> Metric<T> {
     }
 
     fn factorize(&mut self) -> Result<()> {
-        let Self { starts, places, values, diagonal, factor, analyzed, factorized, closed, right, .. } = self;
+        let Self { starts, places, values, diagonal, factor, dense, analyzed, factorized, closed, right, .. } = self;
         let size = diagonal.len();
         let shift = T::one() + T::of(SHIFT).max(T::of(2.0) * negligible(size));
         memory::grow(right, size, 1, WHAT)?;
@@ -153,6 +160,17 @@ impl<T: Real> Metric<T> {
                     (false, ..) => T::zero(),
                 }
             }));
+        }
+        self.is_dense = size <= FEW;
+        if self.is_dense {
+            let fill = |i: usize, row: &mut [T]| {
+                row.fill(T::zero());
+                let column = starts[i]..starts[i + 1];
+                let entries = places[column.clone()].iter().zip(&factorized[column]);
+                entries.take_while(|(j, _)| **j <= i).for_each(|(&j, &value)| row[j] = value);
+            };
+            let dense = dense.get_or_insert_with(|| DenseCholesky::with_capacity(FEW));
+            return dense.factorize_rows(size, fill).map_err(|dof| Error::Singular { matrix: "rows of contact", dof });
         }
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, starts, None, places);
         let [known_starts, known_places] = analyzed;
@@ -277,7 +295,11 @@ impl<T: Real> Metric<T> {
     }
 
     fn solve(&mut self) -> bool {
-        let Self { factor, right, .. } = self;
+        let Self { factor, dense, is_dense, right, .. } = self;
+        if let Some(dense) = dense.as_mut().filter(|_| *is_dense) {
+            dense.solve(right);
+            return T::all_finite(right);
+        }
         factor.as_mut().is_some_and(|factor| factor.solve(right).is_ok()) && T::all_finite(right)
     }
 }

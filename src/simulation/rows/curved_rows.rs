@@ -81,6 +81,10 @@ pub(crate) struct CurvedRowsWork<T> {
     pub(crate) predicted: Vec<T>,
     /// The largest difference after the last linearization.
     pub(crate) worst: Worst,
+    /// The residual to which a contact problem is solved by products with A.
+    pub(crate) residual: f64,
+    /// Whether the last problem was solved as far as rounding allows.
+    pub(crate) is_exact: bool,
 }
 
 impl<T: Real> CurvedRowsWork<T> {
@@ -92,7 +96,14 @@ impl<T: Real> CurvedRowsWork<T> {
             gaps: Vec::new(),
             predicted: Vec::new(),
             worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: SAME_ROWS },
+            residual: 0.0,
+            is_exact: true,
         }
+    }
+
+    /// Another problem is solved, by products with A to a residual.
+    pub(crate) fn begin(&mut self, residual: f64) {
+        (self.residual, self.is_exact) = (residual, true);
     }
 
     /// Memory for `rows` rows with `entries` weights.

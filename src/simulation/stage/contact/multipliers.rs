@@ -135,8 +135,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
         self.guess_multipliers();
         let Self { stage, clock, host, new, g, operator, contact, .. } = self;
-        let ContactWork { rows, interface, .. } = &mut **contact;
-        let ContactRowsWork { laws, weight, curved, problem, .. } = rows;
+        let ContactWork { rows: work, interface, .. } = &mut **contact;
+        let ContactRowsWork { laws, weight, curved, problem, .. } = &mut *work;
         let ProblemRows { rows, own, offset, sets, tolerance, multipliers, .. } = problem;
         own.clear();
         // A row with a known force has no weight, and with this no finite compliance.
@@ -145,13 +145,16 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let InterfaceWork { problem_forces, response, .. } = interface;
         let solved = operator.solve_by_products(
             (&mut *host.system, clock.h, at),
-            assembly,
+            (assembly, curved.residual),
             RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[] },
             multipliers,
             [problem_forces, response],
         )?;
         match solved {
-            Some(Outcome { products, is_solved: true, .. }) => Ok(Some(products)),
+            Some(Outcome { products, is_solved: true, .. }) => {
+                curved.is_exact = curved.residual <= projected_residual::<T>().value();
+                Ok(Some(products))
+            }
             Some(Outcome { products, residual, .. }) if assembly == Assembly::Never => Err(Error::LinearNotConverged {
                 method: "projected conjugate gradients for contact (`Assembly::Automatic` forms W where they fail)",
                 iterations: products,

@@ -4,6 +4,7 @@
 use crate::contact::Candidates;
 use crate::error::Result;
 use crate::real::Real;
+use crate::rounding::{FIRST_RESIDUAL, RESIDUAL_BY_MISS, projected_residual};
 use crate::simulation::operator::interface::{advance, keep, restore};
 use crate::simulation::rows::curved_rows::{LINEARIZATIONS, Miss};
 use crate::simulation::stage::StageSolve;
@@ -21,8 +22,12 @@ impl<T: Real> StageSolve<'_, '_, T> {
 
     /// Solves with the present rows, then with rows linearized at the result, until rows and result agree.
     fn iterate_contact(&mut self) -> Result<bool> {
+        let exact = projected_residual::<T>().value();
+        // Problems by products with A are solved as well as their rows fit, and at last as far as rounding allows.
+        let mut residual = if self.constraints.is_affine() { exact } else { FIRST_RESIDUAL };
         let mut before = [Miss::ALL; 2];
         for iteration in 1..=LINEARIZATIONS {
+            self.contact.rows.curved.begin(residual.max(exact));
             match iteration {
                 1 => self.evaluate_without_contact()?,
                 _ => self.extrapolate_without_contact()?,
@@ -36,14 +41,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 return Ok(true);
             }
             self.predict_gaps(needed);
-            if self.linearize_rows()? == Candidates::Unchanged {
+            let fits = self.linearize_rows()? == Candidates::Unchanged;
+            if fits && self.contact.rows.curved.is_exact {
                 return Ok(true);
             }
             self.operator.follow(self.contact.rows.curved.version(self.constraints));
             let miss = self.measure_miss()?;
-            if miss.has_converged::<T>(iteration, before) {
+            let fits = fits || miss.has_converged::<T>(iteration, before);
+            if fits && self.contact.rows.curved.is_exact {
                 return Ok(true);
             }
+            residual = if fits { exact } else { residual.min(RESIDUAL_BY_MISS * miss.largest()) };
             before = [miss, before[0]];
         }
         Ok(false)

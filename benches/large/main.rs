@@ -1,0 +1,239 @@
+//! Large bodies with thousands of contacts, without a factorization: the time of a step, and the memory of a run.
+//!
+//! - `cargo bench --features rayon --bench large -- [cells a side]…` (default 20 to 130): a slab of cubes falls on
+//!   a wavy floor.
+//! - `-- heap [cells a side]…` (default 20 to 100): ten slabs lie on each other, all their nodes pressed.
+//! - `-- courant [cells a side]` (default 60): the slab at longer steps, beside the factor.
+//! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
+
+mod grid;
+
+use contact_dynamics::contact::GapFunction;
+use contact_dynamics::contact_solver::Assembly;
+use contact_dynamics::{
+    ActiveSet, Cholesky, ConjugateGradients, GeneralizedAlpha, LinearRows, LinearSystem, Result, Simulation,
+    SimulationBuilder,
+};
+use contact_dynamics_scenes::solids::Material;
+use example_support::timing::{Arguments, median};
+use grid::Grid;
+use std::f64::consts::PI;
+use std::time::Instant;
+
+const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
+
+/// Velocity of a fall: strains are of this order.
+const SPEED: f64 = 0.01;
+
+fn main() -> Result<()> {
+    let is_given = |word: &str| std::env::args().any(|argument| argument == word);
+    println!(
+        "Chung-Hulbert with default corrections, Courant number 1, conjugate gradients but where a factor is named"
+    );
+    println!("a pass over a gigabyte of memory takes {:.3} s on one thread", bandwidth());
+    if is_given("heap") {
+        heaps(&Arguments::read(&[20, 40, 60, 80, 100], &[4]))
+    } else if is_given("courant") {
+        courants(&Arguments::read(&[60], &[6]))
+    } else if is_given("exact") {
+        exact(&Arguments::read(&[46], &[6]))
+    } else {
+        slabs(&Arguments::read(&[20, 40, 60, 80, 100, 130], &[6]))
+    }
+}
+
+/// Time to read a gigabyte that is in no cache.
+fn bandwidth() -> f64 {
+    let values = vec![1.0_f64; 1 << 24];
+    let start = Instant::now();
+    let sums = values.chunks_exact(8).fold([0.0; 8], |sums, chunk| std::array::from_fn(|k| sums[k] + chunk[k]));
+    assert!(std::hint::black_box(sums)[0] > 0.0);
+    start.elapsed().as_secs_f64() * 8.0
+}
+
+/// The largest memory of this process so far, in GiB; NaN where the system does not tell.
+fn memory() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmHWM"));
+    let kib = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|kib| kib.parse::<f64>().ok());
+    kib.unwrap_or(f64::NAN) / f64::from(1 << 20)
+}
+
+/// A slab whose thickness is three tenths of its sides.
+fn slab(cells: usize) -> Grid {
+    Grid { cells: [cells, cells, (3 * cells).div_ceil(10)], size: 1.0, material: MATERIAL }
+}
+
+/// The size of a step with this Courant number.
+fn step(grid: &Grid, courant: f64) -> f64 {
+    courant * grid.size / MATERIAL.wave_speed()
+}
+
+/// A slab that falls on a floor with waves, whose crests it touches after two steps.
+fn falling(grid: &Grid, h: f64) -> Result<SimulationBuilder<'static, f64>> {
+    let velocity: Vec<f64> = (0..grid.dofs()).map(|dof| if dof % 3 == 2 { -SPEED } else { 0.0 }).collect();
+    let (height, wave) = (0.04, 6.0 * PI / grid.cells[0] as f64);
+    let waves = |place: [usize; 3]| {
+        let at = [place[0] as f64, place[1] as f64];
+        move |_: f64, u: &[f64], v: &[f64], gradient: &mut [f64]| {
+            let [(sx, cx), (sy, cy)] = [0, 1].map(|axis| (wave * (at[axis] + u[axis])).sin_cos());
+            gradient.copy_from_slice(&[-height * wave * cx * sy, -height * wave * sx * cy, 1.0]);
+            let bends = sx * sy * (v[0] * v[0] + v[1] * v[1]) - 2.0 * cx * cy * v[0] * v[1];
+            [u[2] + height * (1.0 - sx * sy) + 1.5 * SPEED * h, 0.0, height * wave * wave * bends]
+        }
+    };
+    let mut bottom = grid.bottom();
+    let dofs = |place: [usize; 3]| [0, 1, 2].map(|axis| 3 * grid.node(place) + axis);
+    let first = bottom.next().expect("a node at the bottom");
+    let floor =
+        bottom.fold(GapFunction::new(&dofs(first), waves(first)), |floor, place| floor.and(&dofs(place), waves(place)));
+    let system = LinearSystem::lumped(grid.mass(), grid.stiffness())?;
+    Ok(Simulation::builder(system, GeneralizedAlpha::default(), h).velocity(velocity).constraint(floor))
+}
+
+/// What some steps cost.
+struct Cost {
+    /// Median time of a step.
+    time: f64,
+    closed: usize,
+    /// Products for contact, a step.
+    products: f64,
+}
+
+fn closed(run: &Simulation<'_, f64>) -> usize {
+    run.state().contacts().closed().iter().filter(|&&closed| closed).count()
+}
+
+fn cost(run: &mut Simulation<'_, f64>, steps: usize) -> Result<Cost> {
+    let before = run.statistics().contact_products;
+    let mut times = Vec::new();
+    for _ in 0..steps {
+        let start = Instant::now();
+        run.step()?;
+        times.push(start.elapsed().as_secs_f64());
+    }
+    let products = (run.statistics().contact_products - before) as f64 / steps as f64;
+    Ok(Cost { time: median(&times), closed: closed(run), products })
+}
+
+/// Prints what a run costs: without contact, in the step of first contact, and later; returns the time of a late step.
+fn row(name: &str, dofs: usize, builder: impl FnOnce() -> Result<SimulationBuilder<'static, f64>>) -> Result<f64> {
+    let builder = builder()?;
+    let start = Instant::now();
+    let mut run = builder.build()?;
+    let build = start.elapsed().as_secs_f64();
+    // A step without contact, and the first with contact, unless the run begins with it.
+    let mut alone = [f64::NAN; 2];
+    while closed(&run) == 0 {
+        let start = Instant::now();
+        run.step()?;
+        alone[usize::from(closed(&run) > 0)] = start.elapsed().as_secs_f64();
+    }
+    cost(&mut run, 8)?;
+    let Cost { time, closed, products } = cost(&mut run, 5)?;
+    let [open, first] = alone.map(|own| if own.is_nan() { "–".into() } else { format!("{own:.3}") });
+    println!(
+        "{name:<12} {dofs:>8} {closed:>7} {products:>9.1} {open:>8} {first:>8} {time:>8.3} {build:>8.1} {:>9.2}",
+        memory()
+    );
+    Ok(time)
+}
+
+fn header() {
+    println!(
+        "{:<12} {:>8} {:>7} {:>9} {:>8} {:>8} {:>8} {:>8} {:>9}",
+        "scene", "dofs", "closed", "products", "open, s", "first, s", "step, s", "build, s", "peak, GiB"
+    );
+}
+
+fn slabs(arguments: &Arguments) -> Result<()> {
+    header();
+    let mut before = None;
+    for &cells in &arguments.sizes {
+        let grid = slab(cells);
+        let builder = || Ok(falling(&grid, step(&grid, 1.0))?.linear_solver(ConjugateGradients::default()));
+        let time = row(&format!("slab {cells}"), grid.dofs(), builder)?;
+        if let Some((dofs, last)) = before.replace((grid.dofs() as f64, time)) {
+            let exponent = f64::ln(time / last) / f64::ln(grid.dofs() as f64 / dofs);
+            println!("{:<12} twice the dofs take {:.2} times as long", "", 2.0_f64.powf(exponent));
+        }
+    }
+    Ok(())
+}
+
+/// Ten slabs of three elements, each on the next; the lowest lies on a floor. All fall.
+fn heaps(arguments: &Arguments) -> Result<()> {
+    header();
+    for &cells in &arguments.sizes {
+        let grid = Grid { cells: [cells, cells, 3], size: 1.0, material: MATERIAL };
+        let (dofs, nodes) = (grid.dofs(), 4);
+        let heap = || {
+            let mut rows = LinearRows::new();
+            for slab in 0..10 {
+                for place in grid.bottom() {
+                    let below = 3 * grid.node(place) + 2;
+                    let own = (slab * dofs + below, 1.0);
+                    rows = match slab {
+                        0 => rows.unilateral(&[own], 0.5 * SPEED),
+                        _ => rows.unilateral(&[own, ((slab - 1) * dofs + below + 3 * (nodes - 1), -1.0)], 0.0),
+                    };
+                }
+            }
+            // A weight of the size of the first impact.
+            let mass: Vec<f64> = (0..10).flat_map(|_| grid.mass()).collect();
+            let weight: Vec<f64> =
+                mass.iter().enumerate().map(|(dof, m)| if dof % 3 == 2 { -SPEED * m } else { 0.0 }).collect();
+            let system = LinearSystem::lumped(mass, grid.stack(10))?.load(move |_, f| f.copy_from_slice(&weight));
+            let velocity = (0..10 * dofs).map(|dof| if dof % 3 == 2 { -SPEED } else { 0.0 }).collect();
+            let builder = Simulation::builder(system, GeneralizedAlpha::default(), step(&grid, 1.0));
+            Ok(builder.velocity(velocity).constraint(rows).linear_solver(ConjugateGradients::default()))
+        };
+        row(&format!("heap {cells}"), 10 * dofs, heap)?;
+    }
+    Ok(())
+}
+
+fn courants(arguments: &Arguments) -> Result<()> {
+    header();
+    for &cells in &arguments.sizes {
+        let grid = slab(cells);
+        for courant in [0.5, 1.0, 2.0, 4.0, 8.0] {
+            for factor in [false, true] {
+                let builder = || {
+                    let builder = falling(&grid, step(&grid, courant))?;
+                    Ok(match factor {
+                        true => builder.linear_solver(Cholesky::default()),
+                        false => builder.linear_solver(ConjugateGradients::default()),
+                    })
+                };
+                row(&format!("{} {courant}", if factor { "factor" } else { "cg" }), grid.dofs(), builder)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The largest difference of a force from that by a factor and W, relative to the largest force.
+fn exact(arguments: &Arguments) -> Result<()> {
+    for &cells in &arguments.sizes {
+        let grid = slab(cells);
+        let builder = || falling(&grid, step(&grid, 1.0));
+        let mut iterates = builder()?.linear_solver(ConjugateGradients::default()).build()?;
+        let solver = ActiveSet::default().with_assembly(Assembly::Always);
+        let mut solves = builder()?.linear_solver(Cholesky::default()).contact_solver(solver).build()?;
+        for number in 1..=8 {
+            iterates.step()?;
+            solves.step()?;
+            let [own, other] = [&iterates, &solves].map(|run| run.state().contacts().forces());
+            let largest = other.iter().fold(0.0, |most: f64, force| most.max(*force));
+            let apart = own.iter().zip(other).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            println!(
+                "{} dofs, step {number}: {} closed, forces apart by {:.1e}",
+                grid.dofs(),
+                closed(&iterates),
+                apart / largest.max(f64::MIN_POSITIVE)
+            );
+        }
+    }
+    Ok(())
+}
