@@ -50,7 +50,7 @@ use std::ops::Range;
 ///     .linear_solver(ConjugateGradients::default())
 ///     .build()?;
 /// run.run_until(50.0, &mut ())?;
-/// assert!(run.state().contacts().closed()[0] && run.gaps()[0].abs() < 1e-12);
+/// assert!(run.state().contacts().closed()[0] && run.gaps()[0].abs() < 1e-10);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

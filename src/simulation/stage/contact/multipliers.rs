@@ -143,23 +143,26 @@ impl<T: Real> StageSolve<'_, '_, T> {
         own.extend(rows.iter().map(|&row| laws.compliance[row] / weight[row]));
         let at = At { t: clock.at(stage.load), u: &new.u, v: &new.v, of: TangentOf::State };
         let InterfaceWork { problem_forces, response, .. } = interface;
+        // Friction follows the normal forces from look to look: it needs all their digits.
+        let exact = projected_residual::<T>().value();
+        let residual = if sets.len() < rows.len() { exact } else { curved.residual };
         let solved = operator.solve_by_products(
             (&mut *host.system, clock.h, at),
-            (assembly, curved.residual),
+            (assembly, residual),
             RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[] },
             multipliers,
             [problem_forces, response],
         )?;
         match solved {
             Some(Outcome { products, is_solved: true, .. }) => {
-                curved.is_exact = curved.residual <= projected_residual::<T>().value();
+                curved.is_exact = residual <= exact;
                 Ok(Some(products))
             }
             Some(Outcome { products, residual, .. }) if assembly == Assembly::Never => Err(Error::LinearNotConverged {
                 method: "projected conjugate gradients for contact (`Assembly::Automatic` forms W where they fail)",
                 iterations: products,
                 residual,
-                tolerance: projected_residual::<T>().value(),
+                tolerance: exact,
             }),
             _ => Ok(None),
         }
