@@ -1,5 +1,7 @@
 //! Work on several threads with the feature `rayon`, in sequence without it.
 
+use num_traits::Zero;
+use std::ops::Add;
 use std::sync::{Mutex, PoisonError};
 
 /// The smallest factor, in scalars, that gets a thread of its own: reading it takes a tenth of a millisecond.
@@ -57,6 +59,35 @@ pub(crate) fn each_chunk<T: Send>(
         Threads::All if !values.is_empty() => from(0, values, length, act),
         _ => values.chunks_mut(length).enumerate().for_each(|(chunk, values)| act(chunk, values)),
     }
+}
+
+/// Calls `act` with the pieces of some vectors of one length, of which it may change the first; returns the sum of its
+/// results, added in an order that depends on the length only.
+pub(crate) fn sum_pieces<T: Send + Sync + Add<Output = T> + Zero, const N: usize, const M: usize>(
+    written: [&mut [T]; N],
+    read: [&[T]; M],
+    act: &(impl Fn([&mut [T]; N], [&[T]; M]) -> T + Sync),
+) -> T {
+    /// Entries of a piece: reading them takes as long as waking a thread.
+    const PIECE: usize = 1 << 14;
+    let size = read.first().map_or(0, |values| values.len());
+    if size <= PIECE {
+        return act(written, read);
+    }
+    let at = size.div_ceil(PIECE) / 2 * PIECE;
+    let mut high = [const { None }; N];
+    let mut number = 0;
+    let low = written.map(|values| {
+        let (low, rest) = values.split_at_mut(at);
+        high[number] = Some(rest);
+        number += 1;
+        low
+    });
+    let high = high.map(Option::unwrap_or_default);
+    let (first, second) = (read.map(|values| &values[..at]), read.map(|values| &values[at..]));
+    let (mut one, mut other) = (T::zero(), T::zero());
+    join(|| one = sum_pieces(low, first, act), || other = sum_pieces(high, second, act));
+    one + other
 }
 
 /// Memory for each thread of a pool.

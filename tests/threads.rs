@@ -4,8 +4,8 @@
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::{
-    ByBody, Cholesky, Composite, Factorization, LinearRows, LinearSolver, LinearSystem, PersistencyCorrection,
-    Simulation, System,
+    ByBody, Cholesky, Composite, ConjugateGradients, Factorization, LinearRows, LinearSolver, LinearSystem,
+    PersistencyCorrection, Simulation, System,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
 
@@ -89,7 +89,6 @@ fn solutions_are_the_same_by_any_number_of_threads() {
     }
 }
 
-/// A body that fails names its own dof, whichever thread meets it first.
 /// Large enough for four parts.
 #[test]
 fn forces_are_the_same_by_any_number_of_threads() {
@@ -103,6 +102,37 @@ fn forces_are_the_same_by_any_number_of_threads() {
     });
 }
 
+/// Long enough for eight parts of the matrix, and for several pieces of the vectors of a contact problem by products.
+#[test]
+fn conjugate_gradients_are_the_same_by_any_number_of_threads() {
+    let block = Solid::block([12.0, 1.2, 0.6], [100, 10, 5], MATERIAL);
+    let bottom = block.surface_nodes().into_iter().filter(|&node| block.nodes[node][2] == 0.0);
+    let bottom: Vec<usize> = bottom.collect();
+    same_bits("a solve", || {
+        let a = matrix(&block, 1);
+        let mut factor = ConjugateGradients::default().analyze(a.symbolic(), &[]).unwrap();
+        factor.factorize(a.as_ref()).unwrap();
+        let mut x: Vec<f64> = (0..a.ncols()).map(|i| (i as f64 * 0.7).sin()).collect();
+        factor.solve(&mut x).unwrap();
+        x
+    });
+    same_bits("steps in contact", || {
+        let floor = bottom.iter().fold(LinearRows::new(), |rows, &node| {
+            rows.unilateral(&[(Solid::<3>::dof(node, 2), 1.0)], 0.001 * block.nodes[node][0])
+        });
+        let mut run = Simulation::builder(block.system::<f64>(), Composite, 0.05)
+            .velocity(block.uniform([0.0, 0.0, -0.1]))
+            .constraint(floor)
+            .linear_solver(ConjugateGradients::default())
+            .build()
+            .unwrap();
+        (0..3).for_each(|_| run.step().unwrap());
+        assert!(run.statistics().contact_products > 0);
+        [run.state().displacement(), run.state().contacts().forces()].concat()
+    });
+}
+
+/// A body that fails names its own dof, whichever thread meets it first.
 #[test]
 fn the_first_body_that_fails_is_told() {
     let block = Solid::block([1.0; 3], [9; 3], MATERIAL);

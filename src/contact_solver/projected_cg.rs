@@ -21,6 +21,7 @@ use crate::dense::dot;
 use crate::error::Result;
 use crate::memory;
 use crate::real::Real;
+use crate::threads;
 use metric::Metric;
 use rows::Rows;
 use statuses::Statuses;
@@ -236,18 +237,24 @@ impl<T: Real> ProjectedCg<T> {
     fn descend(&mut self, problem: &mut SparseProblem<'_, T>, square: T, last: &mut Option<T>) -> bool {
         let share = last.map_or(T::zero(), |last| square / last);
         *last = Some(square);
-        for ((p, &r), &inverse) in self.direction.iter_mut().zip(&self.residual).zip(&self.inverse) {
-            *p = inverse * r + if share > T::zero() { share * *p } else { T::zero() };
-        }
         let Self { rows, metric, statuses, inverse, x, residual, direction, product, reach, .. } = self;
+        threads::sum_pieces([direction], [residual, inverse], &|[p], [r, inverse]| {
+            for ((p, &r), &inverse) in p.iter_mut().zip(r).zip(inverse) {
+                *p = inverse * r + if share > T::zero() { share * *p } else { T::zero() };
+            }
+            T::zero()
+        });
         *reach += 1;
         multiply(problem, *reach, inverse, (direction, product));
-        let curvature = dot(direction, product);
+        let curvature = threads::sum_pieces([], [direction, product], &|[], [p, product]| dot(p, product));
         let sound = curvature > T::zero();
         if sound {
             let length = square / curvature;
-            T::axpy(length, direction, x);
-            T::axpy(-length, product, residual);
+            threads::sum_pieces([x, residual], [direction, product], &|[x, residual], [p, product]| {
+                T::axpy(length, p, x);
+                T::axpy(-length, product, residual);
+                T::zero()
+            });
             metric.project(rows, statuses, inverse, (residual, square.sqrt()));
         }
         sound
@@ -273,7 +280,9 @@ fn multiply<T: Real>(problem: &mut SparseProblem<'_, T>, reach: usize, inverse: 
 
 /// rᵀ D⁻¹ r.
 fn weighted<T: Real>(r: &[T], inverse: &[T]) -> T {
-    r.iter().zip(inverse).map(|(&r, &inverse)| inverse * r * r).sum()
+    threads::sum_pieces([], [r, inverse], &|[], [r, inverse]| {
+        r.iter().zip(inverse).map(|(&r, &inverse)| inverse * r * r).sum()
+    })
 }
 
 /// A ratio of sizes; zero if there is nothing to compare with.

@@ -8,7 +8,9 @@
 
 use crate::rounding::rounding;
 use crate::scalar::Scalar;
+use crate::threads;
 use faer::traits::pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
 
 /// Blocks below the diagonal of a symmetric matrix, row by row, each stored column by column.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +26,9 @@ pub struct Iteration<'a, T> {
     pub lower: Blocks<'a, T>,
     /// C⁻¹ of each diagonal block C Cᵀ of the matrix.
     pub scaling: &'a [T],
+    /// The ends of parts, in rows of blocks: no part has a block in the columns of another, and several threads share
+    /// them. Rows behind the last part may have blocks in all columns.
+    pub parts: &'a [usize],
     /// Tolerance of the preconditioned residual, relative to the right-hand side.
     pub tolerance: f64,
     /// An update smaller than this share of the solution ends the iteration.
@@ -36,6 +41,9 @@ pub(crate) type Lanes<T, const W: usize> = [T; W];
 
 /// Number of right-hand sides that are solved together.
 pub(crate) const LANES: usize = 4;
+
+/// The largest number of parts.
+pub(crate) const MOST_PARTS: usize = 8;
 
 /// Vectors of conjugate gradients: the solution, the right-hand side, which is overwritten, and three work vectors.
 #[derive(Debug)]
@@ -53,6 +61,20 @@ impl<'a, T, const W: usize> Vectors<'a, T, W> {
         let mut parts = memory.as_chunks_mut().0.chunks_exact_mut(size.max(1));
         let mut next = || parts.next().map_or(&mut [][..], |part| &mut part[..size]);
         Self { x: next(), r: next(), p: next(), t: next(), y: next() }
+    }
+
+    /// The same vectors for a shorter time.
+    #[inline(always)]
+    fn lend(&mut self) -> Vectors<'_, T, W> {
+        Vectors { x: self.x, r: self.r, p: self.p, t: self.t, y: self.y }
+    }
+
+    /// The entries before `at`, and the others.
+    #[inline(always)]
+    fn split_at(self, at: usize) -> [Self; 2] {
+        let [(x, x_), (r, r_), (p, p_), (t, t_), (y, y_)] =
+            [self.x, self.r, self.p, self.t, self.y].map(|vector| vector.split_at_mut(at));
+        [Self { x, r, p, t, y }, Self { x: x_, r: r_, p: p_, t: t_, y: y_ }]
     }
 }
 
@@ -256,10 +278,11 @@ impl<T: Scalar, const B: usize, const W: usize> WithSimd for Solve<'_, T, B, W> 
 #[inline(always)]
 fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
     iteration: &Iteration<'_, T>,
-    Vectors { x, r, p, t, y }: Vectors<'_, T, W>,
+    mut vectors: Vectors<'_, T, W>,
 ) -> [Outcome; W] {
-    let Iteration { lower, scaling, tolerance, resolution, limit } = *iteration;
+    let Iteration { lower, scaling, parts, tolerance, resolution, limit } = *iteration;
     let mut largest = [T::zero(); W];
+    let r = &mut *vectors.r;
     for (r, inverse) in r.as_chunks_mut::<B>().0.iter_mut().zip(scaling.chunks_exact(B * B)) {
         *r = each_lane(r, |r| lower_product(inverse, r));
         for r in r {
@@ -278,7 +301,8 @@ fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
     }
     let ends = Ends { tolerance, resolution: resolution * resolution, limit, first: 0.0, length: 0.0, iterations: 0 };
     let mut ends = [ends; W];
-    let mut outcomes = iterate::<T, B, W>(&lower, &mut ends, [x, r, p, t, y]);
+    let mut outcomes = iterate::<T, B, W>(&Sweeps { lower, parts }, &mut ends, vectors.lend());
+    let x = vectors.x;
     let mut lengths = [0.0; W];
     for x in &*x {
         accumulate(x, x, &mut lengths);
@@ -311,44 +335,95 @@ fn powers<T: Scalar>(x: T) -> Option<[T; 2]> {
     (x > T::zero() && x.is_finite()).then(|| [-exponent, exponent].map(|exponent| T::of(2.0_f64.powi(exponent))))
 }
 
+/// A matrix whose parts several threads share.
+struct Sweeps<'a, T> {
+    lower: Blocks<'a, T>,
+    parts: &'a [usize],
+}
+
+/// Some rows of blocks, and where the entries of vectors that come with them begin.
+#[derive(Clone)]
+struct Rows {
+    range: Range<usize>,
+    first: usize,
+}
+
+impl<T: Scalar> Sweeps<'_, T> {
+    /// The rows behind the parts, with all entries of the vectors.
+    fn border(&self) -> Rows {
+        Rows { range: self.parts.last().copied().unwrap_or(0)..self.lower.pointers.len() - 1, first: 0 }
+    }
+
+    /// Calls `act` for each part, with its entries of the vectors, on several threads; returns the sum of its results.
+    #[inline(always)]
+    fn each_part<const B: usize, const W: usize>(
+        &self,
+        vectors: Vectors<'_, T, W>,
+        act: impl Fn(Rows, Vectors<'_, T, W>) -> Lanes<f64, W> + Sync,
+    ) -> Lanes<f64, W> {
+        if self.parts.is_empty() {
+            return [0.0; W];
+        }
+        let mut sums = [[0.0; W]; MOST_PARTS];
+        each_of::<T, B, W>(self.parts, 0, vectors, &mut sums[..self.parts.len()], &act);
+        // In the order of the parts, for any number of threads.
+        sums.iter().fold([0.0; W], |all, own| std::array::from_fn(|l| all[l] + own[l]))
+    }
+}
+
+/// Calls `act` for each of some parts, the first of which begins with the row `first`.
+fn each_of<T: Scalar, const B: usize, const W: usize>(
+    parts: &[usize],
+    first: usize,
+    vectors: Vectors<'_, T, W>,
+    sums: &mut [Lanes<f64, W>],
+    act: &(impl Fn(Rows, Vectors<'_, T, W>) -> Lanes<f64, W> + Sync),
+) {
+    if let ([end], [sum]) = (parts, &mut *sums) {
+        let [own, _] = vectors.split_at((end - first) * B);
+        *sum = act(Rows { range: first..*end, first }, own);
+        return;
+    }
+    let half = parts.len() / 2;
+    let middle = parts[half - 1];
+    let [low, high] = vectors.split_at((middle - first) * B);
+    let (low_sums, high_sums) = sums.split_at_mut(half);
+    threads::join(
+        || each_of::<T, B, W>(&parts[..half], first, low, low_sums, act),
+        || each_of::<T, B, W>(&parts[half..], middle, high, high_sums, act),
+    );
+}
+
 /// With the preconditioner (1 + L)(1 + Lᵀ), in a form in which a step costs only one product (Eisenstat, 1981): in
 /// the variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
 /// A right-hand side whose iteration has ended waits for the others, with steps of zero.
 #[inline(always)]
 fn iterate<T: Scalar, const B: usize, const W: usize>(
-    lower: &Blocks<'_, T>,
+    sweeps: &Sweeps<'_, T>,
     ends: &mut [Ends; W],
-    [x, r, p, t, y]: [&mut [Lanes<T, W>]; 5],
+    mut vectors: Vectors<'_, T, W>,
 ) -> [Outcome; W] {
-    let size = x.len();
-    let (r, p, t, y) = (&mut r[..size], &mut p[..size], &mut t[..size], &mut y[..size]);
-    x.fill([T::zero(); W]);
-    let mut rho = [0.0; W];
-    for row in 0..size / B {
-        let sums = gather::<T, B, W>(lower, row, r);
-        for (r, sum) in r[row * B..][..B].iter_mut().zip(sums) {
-            *r = std::array::from_fn(|l| r[l] - sum[l]);
-            accumulate(r, r, &mut rho);
-        }
-    }
-    p.copy_from_slice(r);
+    let (lower, border) = (&sweeps.lower, sweeps.border());
+    let behind = border.range.start * B;
+    vectors.x.fill([T::zero(); W]);
+    let mut rho = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| eliminate::<T, B, W>(lower, rows, own.r));
+    add(&mut rho, eliminate::<T, B, W>(lower, border.clone(), vectors.r));
     for l in 0..W {
         ends[l].first = rho[l];
     }
+    let mut beta = [T::zero(); W];
+    vectors.p.fill([T::zero(); W]);
     let mut outcomes = rho.map(|rho| (rho == 0.0).then_some(Outcome::Converged { iterations: 0 }));
     while outcomes.iter().any(Option::is_none) {
-        t.copy_from_slice(p);
-        for row in (0..size / B).rev() {
-            scatter::<T, B, W>(lower, row, t);
-        }
-        let mut curvature = [0.0; W];
-        for row in 0..size / B {
-            let sums = gather::<T, B, W>(lower, row, y);
-            for (k, sum) in (row * B..).zip(sums) {
-                y[k] = std::array::from_fn(|l| p[k][l] - t[k][l] - sum[l]);
-                accumulate(&p[k], &std::array::from_fn(|l| t[k][l] + y[k][l]), &mut curvature);
-            }
-        }
+        sweeps.each_part::<B, W>(vectors.lend(), |_, own| turn(beta, own));
+        turn(beta, vectors.lend().split_at(behind)[1].lend());
+        substitute_back::<T, B, W>(lower, border.clone(), vectors.t);
+        let mut curvature = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| {
+            substitute_back::<T, B, W>(lower, rows.clone(), own.t);
+            substitute::<T, B, W>(lower, rows, [own.p, own.t], own.y)
+        });
+        let known = [&*vectors.p, &*vectors.t];
+        add(&mut curvature, substitute::<T, B, W>(lower, border.clone(), known, vectors.y));
         let mut steps = [0.0; W];
         for l in 0..W {
             if outcomes[l].is_some() {
@@ -358,35 +433,109 @@ fn iterate<T: Scalar, const B: usize, const W: usize>(
                 steps[l] = rho[l] / curvature[l];
             } else {
                 let mut length = [0.0; W];
-                for t in &*t {
+                for t in &*vectors.t {
                     accumulate(t, t, &mut length);
                 }
                 let curvature = curvature[l] / length[l];
                 let curvature = if curvature.is_nan() { 0.0 } else { curvature };
-                outcomes[l] = Some(Outcome::Indefinite { curvature, dof: place_of_largest(t, l) });
+                outcomes[l] = Some(Outcome::Indefinite { curvature, dof: place_of_largest(vectors.t, l) });
             }
         }
         let (alpha, before) = (steps.map(T::of), rho);
-        rho = [0.0; W];
-        for k in 0..size {
-            for l in 0..W {
-                x[k][l] += alpha[l] * t[k][l];
-                r[k][l] -= alpha[l] * (t[k][l] + y[k][l]);
-            }
-            accumulate(&r[k], &r[k], &mut rho);
-        }
-        let mut beta = [T::zero(); W];
+        rho = sweeps.each_part::<B, W>(vectors.lend(), |_, own| advance(alpha, own));
+        add(&mut rho, advance(alpha, vectors.lend().split_at(behind)[1].lend()));
         for l in 0..W {
+            beta[l] = T::zero();
             if outcomes[l].is_none() {
                 outcomes[l] = ends[l].outcome(steps[l], before[l], rho[l]);
                 beta[l] = T::of(rho[l] / before[l]);
             }
         }
-        for (p, r) in p.iter_mut().zip(r.iter()) {
-            *p = std::array::from_fn(|l| r[l] + beta[l] * p[l]);
-        }
     }
     outcomes.map(|outcome| outcome.unwrap_or(Outcome::Converged { iterations: 0 }))
+}
+
+#[inline(always)]
+fn add<const W: usize>(sums: &mut Lanes<f64, W>, others: Lanes<f64, W>) {
+    for l in 0..W {
+        sums[l] += others[l];
+    }
+}
+
+/// Solves (1 + L) r' = r in place; returns the squared length of the result.
+#[inline(always)]
+fn eliminate<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    Rows { range, first }: Rows,
+    r: &mut [Lanes<T, W>],
+) -> Lanes<f64, W> {
+    let mut rho = [0.0; W];
+    for row in range {
+        let sums = gather::<T, B, W>(lower, row, first, r);
+        for (r, sum) in r[(row - first) * B..][..B].iter_mut().zip(sums) {
+            *r = std::array::from_fn(|l| r[l] - sum[l]);
+            accumulate(r, r, &mut rho);
+        }
+    }
+    rho
+}
+
+/// The next direction p, also in t.
+#[inline(always)]
+fn turn<T: Scalar, const W: usize>(beta: Lanes<T, W>, Vectors { r, p, t, .. }: Vectors<'_, T, W>) -> Lanes<f64, W> {
+    for ((p, t), r) in p.iter_mut().zip(t).zip(&*r) {
+        *p = std::array::from_fn(|l| r[l] + beta[l] * p[l]);
+        *t = *p;
+    }
+    [0.0; W]
+}
+
+/// Solves (1 + Lᵀ) t' = t in place.
+#[inline(always)]
+fn substitute_back<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    Rows { range, first }: Rows,
+    t: &mut [Lanes<T, W>],
+) {
+    for row in range.rev() {
+        scatter::<T, B, W>(lower, row, first, t);
+    }
+}
+
+/// Solves (1 + L) y = p − t; returns p · (t + y).
+#[inline(always)]
+fn substitute<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    Rows { range, first }: Rows,
+    [p, t]: [&[Lanes<T, W>]; 2],
+    y: &mut [Lanes<T, W>],
+) -> Lanes<f64, W> {
+    let mut curvature = [0.0; W];
+    for row in range {
+        let sums = gather::<T, B, W>(lower, row, first, y);
+        for (k, sum) in ((row - first) * B..).zip(sums) {
+            y[k] = std::array::from_fn(|l| p[k][l] - t[k][l] - sum[l]);
+            accumulate(&p[k], &std::array::from_fn(|l| t[k][l] + y[k][l]), &mut curvature);
+        }
+    }
+    curvature
+}
+
+/// A step along the direction; returns the squared length of the residual.
+#[inline(always)]
+fn advance<T: Scalar, const W: usize>(
+    alpha: Lanes<T, W>,
+    Vectors { x, r, t, y, .. }: Vectors<'_, T, W>,
+) -> Lanes<f64, W> {
+    let mut rho = [0.0; W];
+    for (((x, r), t), y) in x.iter_mut().zip(r).zip(&*t).zip(&*y) {
+        for l in 0..W {
+            x[l] += alpha[l] * t[l];
+            r[l] -= alpha[l] * (t[l] + y[l]);
+        }
+        accumulate(r, r, &mut rho);
+    }
+    rho
 }
 
 /// Applies a function of the B entries of a row to each right-hand side.
@@ -399,18 +548,19 @@ fn each_lane<T: Scalar, const B: usize, const W: usize>(
     std::array::from_fn(|k| std::array::from_fn(|l| lanes[l][k]))
 }
 
-/// Σ_J L_IJ y_J of block row I.
+/// Σ_J L_IJ y_J of block row I, with y from the row `first` on.
 #[inline(always)]
 fn gather<T: Scalar, const B: usize, const W: usize>(
     lower: &Blocks<'_, T>,
     row: usize,
+    first: usize,
     y: &[Lanes<T, W>],
 ) -> Row<T, B, W> {
     let range = lower.pointers[row]..lower.pointers[row + 1];
     let mut sums = [[[T::zero(); W]; B]; B];
     let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
     for (&column, block) in lower.columns[range].iter().zip(blocks) {
-        let y = &y[column as usize * B..][..B];
+        let y = &y[(column as usize - first) * B..][..B];
         for c in 0..B {
             for r in 0..B {
                 for l in 0..W {
@@ -422,14 +572,19 @@ fn gather<T: Scalar, const B: usize, const W: usize>(
     std::array::from_fn(|r| std::array::from_fn(|l| (0..B).map(|c| sums[c][r][l]).sum()))
 }
 
-/// `y_J −= L_IJᵀ y_I` for all J of block row I.
+/// `y_J −= L_IJᵀ y_I` for all J of block row I, with y from the row `first` on.
 #[inline(always)]
-fn scatter<T: Scalar, const B: usize, const W: usize>(lower: &Blocks<'_, T>, row: usize, y: &mut [Lanes<T, W>]) {
-    let x: Row<T, B, W> = std::array::from_fn(|k| y[row * B + k]);
+fn scatter<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    row: usize,
+    first: usize,
+    y: &mut [Lanes<T, W>],
+) {
+    let x: Row<T, B, W> = std::array::from_fn(|k| y[(row - first) * B + k]);
     let range = lower.pointers[row]..lower.pointers[row + 1];
     let blocks = lower.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
     for (&column, block) in lower.columns[range].iter().zip(blocks) {
-        let y = &mut y[column as usize * B..][..B];
+        let y = &mut y[(column as usize - first) * B..][..B];
         for c in 0..B {
             for l in 0..W {
                 let mut sum = T::zero();

@@ -1,5 +1,7 @@
 //! Preconditioned conjugate gradients: large bodies at small steps.
 
+mod parts;
+
 use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
 use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Vectors};
@@ -7,6 +9,7 @@ use crate::memory;
 use crate::real::Real;
 use crate::sparse;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use parts::Parts;
 use std::ops::Range;
 
 /// Preconditioned conjugate gradients (Hestenes and Stiefel, J. Res. Nat. Bur. Standards 49, 1952) for symmetric
@@ -108,6 +111,8 @@ struct Matrix<T: Real> {
     fingerprint: Fingerprint,
     /// Dofs of a block: 1, 2 or 3.
     size: usize,
+    /// The order of the rows of blocks.
+    parts: Parts,
     /// Blocks below the diagonal, row by row: their columns, ascending, and values.
     pointers: Vec<usize>,
     columns: Vec<u32>,
@@ -188,9 +193,11 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
                 best = Some((size, pointers, columns));
             }
         }
-        let Some((size, pointers, columns)) = best else {
+        let Some((size, mut pointers, mut columns)) = best else {
             return Err(Error::Empty { what: "the pattern", remedy: "a system has at least one dof" });
         };
+        let parts = Parts::find(&pointers, &columns, size)?;
+        parts.sort(&mut pointers, &mut columns)?;
         let what = "a matrix in blocks";
         let values = memory::zeros(columns.len(), size * size, what)?;
         let scaling = memory::zeros(dofs, size, what)?;
@@ -199,6 +206,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
             dofs,
             fingerprint: Fingerprint::of(pattern),
             size,
+            parts,
             pointers,
             columns,
             values,
@@ -214,24 +222,25 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
 impl<T: Real> Matrix<T> {
     /// Copies the entries of a symmetric matrix.
     fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { size, pointers, columns, values, scaling, .. } = self;
+        let Self { size, parts, pointers, columns, values, scaling, .. } = self;
         let size = *size;
         values.fill(T::zero());
         scaling.fill(T::zero());
         for dof in 0..a.ncols() {
-            let (row, place) = (dof / size, dof % size);
+            let (row, place) = (parts.place(dof / size), dof % size);
             let own: Range<usize> = pointers[row]..pointers[row + 1];
             let mut at = own.start;
             for (&other, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
-                let (column, within) = (other / size, other % size);
+                let (column, within) = (parts.place(other / size), other % size);
                 if column >= row {
                     if column == row {
                         scaling[(row * size + within) * size + place] = value;
                     }
                     continue;
                 }
-                while at < own.end && (columns[at] as usize) < column {
-                    at += 1;
+                // Most columns follow in the order in which they are stored.
+                if at == own.end || columns[at] as usize != column {
+                    at = own.start + columns[own.clone()].partition_point(|&other| (other as usize) < column);
                 }
                 if at == own.end || columns[at] as usize != column {
                     let part = "conjugate gradients".into();
@@ -241,6 +250,7 @@ impl<T: Real> Matrix<T> {
                     });
                 }
                 values[(at * size + within) * size + place] = value;
+                at += usize::from(within + 1 == size);
             }
         }
         Ok(())
@@ -254,13 +264,13 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
         self.fill(a)?;
         T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)
-            .map_err(|dof| Error::Singular { matrix: "effective matrix", dof })?;
+            .map_err(|dof| Error::Singular { matrix: "effective matrix", dof: self.parts.dof(dof, self.size) })?;
         self.state = Ready::Yes;
         Ok(())
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { settings, dofs, size, pointers, columns, values, scaling, vectors, .. } = self;
+        let Self { settings, dofs, size, parts, pointers, columns, values, scaling, vectors, .. } = self;
         if self.state == Ready::No {
             let part = "conjugate gradients".into();
             return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
@@ -271,19 +281,25 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         let lower = Blocks { pointers, columns, values };
         let (tolerance, limit) = (settings.tolerance, settings.iterations);
         let resolution = T::epsilon().value();
-        let iteration = Iteration { lower, scaling, tolerance, resolution, limit };
+        let iteration = Iteration { lower, scaling, parts: &parts.ends, tolerance, resolution, limit };
         self.iterations = 0;
         for column in rhs.chunks_exact_mut(*dofs) {
-            vectors[*dofs..2 * *dofs].copy_from_slice(column);
+            for (row, values) in column.chunks_exact(*size).enumerate() {
+                vectors[*dofs + parts.place(row) * *size..][..*size].copy_from_slice(values);
+            }
             let [outcome] = T::conjugate_gradients(*size, &iteration, Vectors::of(vectors, *dofs));
-            column.copy_from_slice(&vectors[..*dofs]);
+            for (row, values) in column.chunks_exact_mut(*size).enumerate() {
+                values.copy_from_slice(&vectors[parts.place(row) * *size..][..*size]);
+            }
             let iterations = match outcome {
                 Outcome::Converged { iterations } => iterations,
                 Outcome::NotConverged { iterations, residual } => {
                     let method = "conjugate gradients";
                     return Err(Error::LinearNotConverged { method, iterations, residual, tolerance });
                 }
-                Outcome::Indefinite { curvature, dof } => return Err(Error::Indefinite { curvature, dof }),
+                Outcome::Indefinite { curvature, dof } => {
+                    return Err(Error::Indefinite { curvature, dof: parts.dof(dof, *size) });
+                }
             };
             self.iterations = self.iterations.max(iterations);
         }

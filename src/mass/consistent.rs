@@ -354,7 +354,7 @@ impl<T: Real> Scaled<T> {
         }
         let lower = Blocks { pointers: &pointers[..=end], columns, values };
         let resolution = far_below_rounding::<T>().value();
-        let iteration = Iteration { lower, scaling, tolerance, resolution, limit };
+        let iteration = Iteration { lower, scaling, parts: &[], tolerance, resolution, limit };
         Ok(T::conjugate_gradients_side_by_side(&iteration, vectors))
     }
 }

@@ -85,6 +85,42 @@ fn solutions_are_those_of_cholesky() {
     }
 }
 
+/// A bar of blocks is large enough for parts that threads share: long ones have several, in any order of axes; where
+/// neighbors have distant numbers there are none. Errors name the dof of the matrix.
+#[test]
+fn matrices_in_parts_are_solved_as_others() {
+    let scattered: Vec<usize> = (0..2673).map(|node| node * 1000 % 2673).collect();
+    for (cells, numbering) in [([80, 10, 2], None), ([2, 10, 80], None), ([80, 10, 2], Some(scattered))] {
+        let block = Solid::block(cells.map(|count| 0.1 * count as f64), cells, SOFT);
+        let n = block.dofs();
+        let place = |dof: usize| numbering.as_ref().map_or(dof, |numbering| 3 * numbering[dof / 3] + dof % 3);
+        let entries: Vec<_> =
+            effective(&block, 0.1, 2.0).into_iter().map(|(i, j, value)| (place(i), place(j), value)).collect();
+        let a = matrix::<f64>(n, entries.clone());
+        let (mut expected, mut found) = (rhs::<f64>(n), rhs::<f64>(n));
+        factorized(&Cholesky::default(), &a).solve(&mut expected).unwrap();
+        let exact = ConjugateGradients::default().tolerance(0.0).unwrap();
+        let mut factor = factorized(&exact, &a);
+        factor.solve(&mut found).unwrap();
+        assert!(difference(&found, &expected) < 1e-12, "{cells:?} {:e}", difference(&found, &expected));
+        for node in [0, 500, 1336, 2672] {
+            // A negative diagonal, and a coupling within the node that leaves its last dof no positive pivot.
+            let (first, last) = (3 * node, 3 * node + 2);
+            for (dof, added) in
+                [(first, vec![(first, first, -1e9)]), (last, vec![(first, last, 1e9), (last, first, 1e9)])]
+            {
+                let broken = matrix::<f64>(n, entries.iter().copied().chain(added));
+                let refused = factor.factorize(broken.as_ref()).unwrap_err();
+                assert!(matches!(refused, Error::Singular { dof: found, .. } if found == dof), "{dof}: {refused}");
+            }
+        }
+        factor.factorize(a.as_ref()).unwrap();
+        let mut again = rhs::<f64>(n);
+        factor.solve(&mut again).unwrap();
+        assert_eq!(found, again);
+    }
+}
+
 #[test]
 fn a_looser_tolerance_is_met_with_fewer_iterations() {
     let block = Solid::block([1.0; 3], [5; 3], SOFT);
