@@ -20,6 +20,8 @@ mod mortar;
 #[cfg(feature = "mesh-contact")]
 mod node_to_facet;
 mod nodes_on_obstacle;
+#[cfg(feature = "mesh-contact")]
+mod non_penetration;
 mod obstacle;
 mod rigid_motion;
 mod rows;
@@ -50,6 +52,8 @@ pub use mortar::{BondStrength, Mortar};
 #[cfg(feature = "mesh-contact")]
 pub use node_to_facet::NodeToFacet;
 pub use nodes_on_obstacle::NodesOnObstacle;
+#[cfg(feature = "mesh-contact")]
+pub use non_penetration::{Certificate, NonPenetration};
 #[cfg(feature = "mesh-contact")]
 pub use obstacle::ClosedSurface;
 pub use obstacle::{Capsule, Cone, Cuboid, Cylinder, Obstacle, Passage, Plane, Side, Sphere};

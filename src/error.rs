@@ -634,6 +634,26 @@ pub enum Error {
         /// Its gap at the start of the step (length).
         gap: f64,
     },
+    /// Two facets may have gone through each other in a step
+    /// ([`NonPenetration`](crate::contact::NonPenetration)).
+    #[error(
+        "step from t = {t:e} with h = {h:e}: facets {} and {} of certified surface {constraint} could not be certified \
+         to stay apart; their nodes moved by up to {way:e}; take smaller steps (`StepControl` does), and look whether \
+         contact has all pairs of bodies",
+        facets[0], facets[1], t = moment(*.t), h = few(*.h), way = few(*.way)
+    )]
+    NotCertified {
+        /// Time at the start of the step.
+        t: f64,
+        /// Step size.
+        h: f64,
+        /// The certificate, in the order in which constraints were given.
+        constraint: usize,
+        /// The facets of its surface.
+        facets: [usize; 2],
+        /// The largest displacement of their nodes (length).
+        way: f64,
+    },
     /// The host cannot evaluate a trial state; a smaller step may help.
     #[error("the host's {callback} does not admit the state of a step: {source}")]
     Inadmissible {
@@ -721,6 +741,7 @@ impl Error {
                 | Self::Jammed { .. }
                 | Self::ContactLost { .. }
                 | Self::PassedThrough { .. }
+                | Self::NotCertified { .. }
                 | Self::Stiffened { .. }
                 | Self::NewtonNotConverged { .. }
                 | Self::LinearNotConverged { .. }

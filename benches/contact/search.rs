@@ -1,8 +1,8 @@
-//! Searches between two plates of a hundred thousand facets, and linearizations of what they find, beside the step
-//! without contact.
+//! Searches between two plates of a hundred thousand facets, linearizations of what they find, and certificates of
+//! non-penetration, beside the step without contact.
 
 use super::MATERIAL;
-use contact_dynamics::contact::ContactConstraint;
+use contact_dynamics::contact::{ContactConstraint, NonPenetration, Stride, Surface};
 use contact_dynamics::{Newmark, Simulation};
 use contact_dynamics_scenes::solids::Solid;
 use contact_dynamics_scenes::stacks::Stack;
@@ -60,6 +60,18 @@ pub(super) fn measure(arguments: &Arguments) {
             (0..2).for_each(|_| searched.search());
             table.row(format!("{name}, {what}"), move || searched.search());
         }
+    }
+    for (what, depth) in [("apart", 0.0), ("all facets near", 0.11)] {
+        let solid = &stack.solid;
+        let surface = Surface::of_cells(&solid.nodes, &solid.elements).expect("plates");
+        let check =
+            NonPenetration::new(&solid.nodes, &solid.node_dofs(), &surface).and_then(|check| check.depth(depth));
+        let Searched { mut contact, states: [start, end], .. } =
+            Searched::new(Box::new(check.expect("a depth")), &stack, 1e-3);
+        contact.search(0.0, &start, &start, 0.0).expect("plates apart");
+        table.row(format!("certificate, {what}"), move || {
+            contact.inspect(&Stride::new([0.0, 1.0], [&start, &end], &start, [&[], &[]])).expect("plates apart");
+        });
     }
     table.sample(arguments.repeated(5), 1);
     table.print();

@@ -24,6 +24,7 @@ mod reach;
 mod search;
 mod second_difference;
 mod second_order;
+mod separation;
 mod shape;
 mod sharp;
 mod vicinity;
@@ -40,6 +41,7 @@ pub(crate) use ramp::Ramp;
 pub(crate) use search::{Bounds, Neighborhood, overhang};
 pub(crate) use second_difference::SecondDifference;
 pub(crate) use second_order::ByNode;
+pub(crate) use separation::{Corners, distance_in_motion};
 pub(crate) use shape::{Foot, Location, Point, Shape, add_scaled, cross, dot, middle, norm, sub, unit};
 pub(crate) use vicinity::Vicinity;
 

@@ -17,6 +17,7 @@ mod itself;
 mod laws;
 mod mortar;
 mod node_to_facet;
+mod non_penetration;
 mod observers;
 mod obstacles;
 mod offsets;

@@ -78,7 +78,7 @@ impl Bounds {
     }
 
     /// Largest absolute coordinate: the scale of rounding.
-    fn magnitude(&self) -> f64 {
+    pub(crate) fn magnitude(&self) -> f64 {
         self.lower.iter().chain(&self.upper).fold(0.0, |largest, x| x.abs().max(largest))
     }
 

@@ -58,13 +58,14 @@ pub(crate) fn gather<'l, T: Real>(dofs: &[usize], x: &[T], local: &'l mut Vec<T>
     local
 }
 
-/// Adds the number of the constraint to the contact in its error.
+/// Adds the number of the constraint to its error.
 pub(crate) fn of(constraint: usize, error: Error) -> Error {
     match error {
         Error::PassedThrough { t, h, contact, what, way, gap } => {
             let contact = ContactId { constraint, ..contact };
             Error::PassedThrough { t, h, contact, what, way, gap }
         }
+        Error::NotCertified { t, h, facets, way, .. } => Error::NotCertified { t, h, constraint, facets, way },
         Error::ContactLost { t, contact } => Error::ContactLost { t, contact: ContactId { constraint, ..contact } },
         Error::ContactNotFinite { t, what, contact, value } => {
             Error::ContactNotFinite { t, what, contact: ContactId { constraint, ..contact }, value }

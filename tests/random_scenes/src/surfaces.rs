@@ -1,6 +1,7 @@
 //! Scenes by chance: every constraint with everything that it can be given, from a seed, looked at in every step.
 
 mod bodies;
+mod crossing;
 mod meeting;
 mod scene;
 mod space;
@@ -9,6 +10,7 @@ mod watch;
 pub use meeting::{Meeting, meetings};
 
 pub(crate) use bodies::{decades, pick};
+use contact_dynamics::contact::Certificate;
 use contact_dynamics::{
     Bathe, Bdf2, CdLagrange, Composite, Error, GeneralizedAlpha, MoreauJean, Newmark, NohBathe, PersistencyCorrection,
     Result, Simulation, StepControl, TimeIntegrator,
@@ -26,6 +28,8 @@ pub struct Variant {
     pub exponents: [i32; 3],
     /// Facets are listed in another order.
     pub reordered: bool,
+    /// Steps that fail are halved, and steps are certified.
+    pub certified: bool,
 }
 
 /// What a scene was like.
@@ -38,6 +42,8 @@ pub struct Figures {
     /// Steps accepted, and attempts that were refused and taken again by half.
     pub steps: u64,
     pub halved: u64,
+    /// Attempts without a certificate, if steps are certified.
+    pub rejected: usize,
     /// The error that has ended the run, by its name, and its words.
     pub refused: Option<(String, String)>,
     /// Whether the scheme is corrected, and whether steps that fail are halved.
@@ -122,10 +128,11 @@ where
     let hash = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     let mut random = Congruential(name.bytes().fold(seed ^ 0xcbf2_9ce4_8422_2325, hash));
     (0..3).for_each(|_| _ = random.unit());
-    let method = Method::new(&mut random);
+    let mut method = Method::new(&mut random);
+    method.halves |= variant.certified;
     let mut figures = Figures { made_of: method.name(), ..Figures::default() };
     let result = Scene::<D>::new(meeting, method.courant, &mut random, &variant);
-    let result = result.and_then(|scene| advance(meeting, scene, method, &mut figures));
+    let result = result.and_then(|scene| advance((meeting, variant), scene, method, &mut figures));
     figures.refused = result.err().map(|error| named(&error));
     let [length, _, time] = variant.exponents.map(|exponent| 2.0_f64.powi(exponent));
     let half = figures.end.len() / 2;
@@ -136,11 +143,20 @@ where
 }
 
 /// Builds the run and takes its steps.
-fn advance<const D: usize>(meeting: Meeting, mut scene: Scene<D>, method: Method, figures: &mut Figures) -> Result<()> {
+fn advance<const D: usize>(
+    (meeting, variant): (Meeting, Variant),
+    mut scene: Scene<D>,
+    method: Method,
+    figures: &mut Figures,
+) -> Result<()>
+where
+    Space<D>: Dimension<D>,
+{
     figures.made_of = format!("{}, {}, μ = {:.2}", figures.made_of, scene.material(), scene.friction);
     (figures.corrected, figures.halves) = (method.correction > 0, method.halves);
     let h = method.courant * scene.crossing;
     let mut builder = Simulation::builder(scene.system()?, method.scheme, h).velocity(scene.velocity.clone());
+    let certificate = if variant.certified { Some(scene.certify()?) } else { None };
     for constraint in scene.constraints.drain(..) {
         builder = builder.constraint(constraint);
     }
@@ -161,9 +177,13 @@ fn advance<const D: usize>(meeting: Meeting, mut scene: Scene<D>, method: Method
             watch.is_unchanged(&before, run.state(), step, figures);
         } else {
             watch.look(&mut run, step, figures)?;
+            if let Some(facets) = certificate.as_ref().and_then(|_| scene.crossing(run.state().displacement())) {
+                figures.findings.push(format!("step {step}: facets {facets:?} cross"));
+            }
         }
         figures.steps = run.statistics().steps;
         figures.halved = run.statistics().refused_steps;
+        figures.rejected = certificate.as_ref().map_or(0, Certificate::rejected);
         figures.end = [run.state().displacement(), run.state().velocity()].concat();
         result?;
     }

@@ -94,6 +94,11 @@ impl Meeting {
         self.misses_edges() || self.what == "beside mortar"
     }
 
+    /// Whether faces, corners and edges of all bodies are kept apart.
+    pub fn keeps_apart(&self) -> bool {
+        self.constraint == "BodyContact"
+    }
+
     /// Dimensions.
     pub fn space(&self) -> usize {
         self.space

@@ -2,11 +2,12 @@
 
 use super::Variant;
 use super::bodies::{Body, decades, dot, pick, rotation, turned};
+use super::crossing::crossing;
 use super::meeting::{Between, Carried, Kind, Meeting};
 use super::space::{Boxed, Dimension, Space};
 use contact_dynamics::contact::{
-    BodyContact, BondStrength, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet, NodesOnObstacle,
-    Obstacle, Plane, Side, Sphere, Surface, SurfaceSettings, Tie,
+    BodyContact, BondStrength, Certificate, ContactLaw, Facet, GapFunction, LinearRows, Mortar, NodeToFacet,
+    NodesOnObstacle, NonPenetration, Obstacle, Plane, Side, Sphere, Surface, SurfaceSettings, Tie,
 };
 use contact_dynamics::{LinearSystem, Result, System};
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
@@ -30,6 +31,9 @@ impl Units {
         Material { young, density: of.density * mass / length.powi(space), ..of }
     }
 }
+
+/// The depth of certificates, as a share of the smallest element.
+const CERTIFIED: f64 = 0.05;
 
 pub(super) struct Scene<const D: usize> {
     pub(super) nodes: Vec<[f64; D]>,
@@ -157,6 +161,23 @@ where
             moved.push(facets);
         }
         moved
+    }
+
+    /// Adds a certificate of non-penetration of all bodies.
+    pub(super) fn certify(&mut self) -> Result<Certificate> {
+        let facets = self.facets(&Variant::default()).concat();
+        let check = NonPenetration::new(&self.nodes, &self.node_dofs(), facets)?.depth(CERTIFIED * self.element)?;
+        let certificate = check.certificate();
+        self.constraints.push(Box::new(check));
+        Ok(certificate)
+    }
+
+    /// Two facets that have crossed each other by more than the certificate admits.
+    pub(super) fn crossing(&self, u: &[f64]) -> Option<[usize; 2]> {
+        let at = |(node, x): (usize, &[f64; D])| std::array::from_fn(|axis| x[axis] + u[D * node + axis]);
+        let positions: Vec<[f64; D]> = self.nodes.iter().enumerate().map(at).collect();
+        // Corners are pulled by less than the distance of their facets: by 1/√3 of it in space.
+        crossing(&self.facets(&Variant::default()).concat(), &positions, 2.0 * CERTIFIED * self.element)
     }
 
     fn surface_nodes(&self) -> Vec<usize> {
