@@ -1,18 +1,19 @@
-//! Large bodies with thousands of contacts, without a factorization: the time of a step, and the memory of a run.
+//! Large bodies with thousands of contacts, without a factorization: time of a step, memory of a run.
 //!
 //! - `cargo bench --features rayon --bench large -- [cells a side]…` (default 20 to 130): a slab of cubes falls on
 //!   a wavy floor.
 //! - `-- heap [cells a side]…` (default 20 to 100): ten slabs lie on each other, all their nodes pressed.
 //! - `-- courant [cells a side]` (default 60): the slab at longer steps, beside the factor.
 //! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
+//! - `-- explicit [cells a side]…` (default 60 and 100): the slab by CD-Lagrange, beside its steps without contact.
 
 mod grid;
 
 use contact_dynamics::contact::GapFunction;
 use contact_dynamics::contact_solver::Assembly;
 use contact_dynamics::{
-    ActiveSet, Cholesky, ConjugateGradients, GeneralizedAlpha, LinearRows, LinearSystem, Result, Simulation,
-    SimulationBuilder,
+    ActiveSet, CdLagrange, Cholesky, ConjugateGradients, GeneralizedAlpha, LinearRows, LinearSystem, Result,
+    Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::solids::Material;
 use example_support::timing::{Arguments, median};
@@ -37,6 +38,8 @@ fn main() -> Result<()> {
         courants(&Arguments::read(&[60], &[6]))
     } else if is_given("exact") {
         exact(&Arguments::read(&[46], &[6]))
+    } else if is_given("explicit") {
+        explicit(&Arguments::read(&[60, 100], &[6]))
     } else {
         slabs(&Arguments::read(&[20, 40, 60, 80, 100, 130], &[6]))
     }
@@ -71,6 +74,11 @@ fn step(grid: &Grid, courant: f64) -> f64 {
 
 /// A slab that falls on a floor with waves, whose crests it touches after two steps.
 fn falling(grid: &Grid, h: f64) -> Result<SimulationBuilder<'static, f64>> {
+    thrown(grid, GeneralizedAlpha::default(), h)
+}
+
+/// The same by another scheme.
+fn thrown(grid: &Grid, scheme: impl TimeIntegrator + 'static, h: f64) -> Result<SimulationBuilder<'static, f64>> {
     let velocity: Vec<f64> = (0..grid.dofs()).map(|dof| if dof % 3 == 2 { -SPEED } else { 0.0 }).collect();
     let (height, wave) = (0.04, 6.0 * PI / grid.cells[0] as f64);
     let waves = |place: [usize; 3]| {
@@ -88,7 +96,7 @@ fn falling(grid: &Grid, h: f64) -> Result<SimulationBuilder<'static, f64>> {
     let floor =
         bottom.fold(GapFunction::new(&dofs(first), waves(first)), |floor, place| floor.and(&dofs(place), waves(place)));
     let system = LinearSystem::lumped(grid.mass(), grid.stiffness())?;
-    Ok(Simulation::builder(system, GeneralizedAlpha::default(), h).velocity(velocity).constraint(floor))
+    Ok(Simulation::builder(system, scheme, h).velocity(velocity).constraint(floor))
 }
 
 /// What some steps cost.
@@ -234,6 +242,35 @@ fn exact(arguments: &Arguments) -> Result<()> {
                 apart / largest.max(f64::MIN_POSITIVE)
             );
         }
+    }
+    Ok(())
+}
+
+/// Times of steps before and after the first contact, and the largest change of the energy.
+fn explicit(arguments: &Arguments) -> Result<()> {
+    println!("CD-Lagrange, Courant number 0.5");
+    println!("{:>8} {:>7} {:>8} {:>8} {:>7} {:>15}", "dofs", "closed", "open, s", "step, s", "ratio", "energy changes");
+    for &cells in &arguments.sizes {
+        let grid = slab(cells);
+        let mut run = thrown(&grid, CdLagrange, step(&grid, 0.5))?.uncorrected().build()?;
+        let start = run.energy().total();
+        let (mut open, mut pressed, mut most, mut change) = (Vec::new(), Vec::new(), 0, 0.0_f64);
+        while pressed.len() < arguments.repeated(60) {
+            let begin = Instant::now();
+            run.step()?;
+            let time = begin.elapsed().as_secs_f64();
+            let closed = closed(&run);
+            most = most.max(closed);
+            change = change.max((run.energy().total() / start - 1.0).abs());
+            if most == 0 { &mut open } else { &mut pressed }.push(time);
+        }
+        let [open, pressed] = [&open, &pressed].map(|times| median(times));
+        println!(
+            "{:>8} {most:>7} {open:>8.4} {pressed:>8.4} {:>7.2} {:>14.2} %",
+            grid.dofs(),
+            pressed / open,
+            100.0 * change
+        );
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 mod bed;
 mod bodies;
+mod drum;
 mod generalized;
 mod incline;
 mod laws;
