@@ -1,0 +1,219 @@
+//! Constraints and obstacles from their descriptions in Python (contacts.py).
+
+use crate::arrays::{self, copy_into, index_lists, index_rows, indices, point, points, shape};
+use crate::callback::infallible;
+use crate::error::{Result, refused};
+use crate::named;
+use contact_dynamics::LinearRows as Rows;
+use contact_dynamics::contact::{
+    self, ContactConstraint, Cuboid, Facet, GapOffset, Plane, Side, Sphere, Surface, SurfaceSettings,
+};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+
+type Object<'py> = Bound<'py, PyAny>;
+type Constraints = Vec<Box<dyn ContactConstraint<f64>>>;
+
+/// The constraints of a description.
+pub(crate) fn build(contact: &Object<'_>) -> Result<Constraints> {
+    let name = contact.get_type().name()?.to_string();
+    if name == "LinearRows" {
+        return Ok(vec![Box::new(linear_rows(contact.getattr("rows")?.extract()?)?)]);
+    }
+    if !["NodesOnObstacle", "BodyContact", "Tie"].contains(&&*name) {
+        let text = "expected LinearRows, NodesOnObstacle, BodyContact or Tie";
+        return Err(refused(format!("a contact is of the type {name}, {text}")).into());
+    }
+    let dimension = shape(&contact.getattr("coordinates")?)?.get(1).copied();
+    match (&*name, dimension) {
+        ("NodesOnObstacle", Some(2)) => nodes_on_obstacle::<2>(contact.extract()?),
+        ("NodesOnObstacle", Some(3)) => nodes_on_obstacle::<3>(contact.extract()?),
+        (_, Some(2)) => between_surfaces::<2>(&name, contact.extract()?),
+        (_, Some(3)) => between_surfaces::<3>(&name, contact.extract()?),
+        _ => Err(refused(format!("{name}: coordinates have the dimension {dimension:?}, expected 2 or 3")).into()),
+    }
+}
+
+/// Coordinates and dofs of the nodes of a mesh; dofs are numbered node by node if they are not given.
+type Mesh<const D: usize> = (Vec<[f64; D]>, Vec<[usize; D]>);
+
+fn mesh<const D: usize>(coordinates: &Object<'_>, dofs: Option<&Object<'_>>) -> PyResult<Mesh<D>> {
+    let coordinates = points(coordinates, "the coordinates")?;
+    let numbered = |node| std::array::from_fn(|axis| node * D + axis);
+    let all = || Ok((0..coordinates.len()).map(numbered).collect());
+    let dofs = dofs.map_or_else(all, |dofs| index_rows(dofs, "the dofs of the nodes"))?;
+    Ok((coordinates, dofs))
+}
+
+#[derive(FromPyObject)]
+struct NodesOnObstacle<'py> {
+    obstacle: Object<'py>,
+    coordinates: Object<'py>,
+    nodes: Object<'py>,
+    dofs: Option<Object<'py>>,
+    friction: f64,
+    law: Object<'py>,
+    reach: Option<f64>,
+    motion: Option<Py<PyAny>>,
+}
+
+fn nodes_on_obstacle<const D: usize>(given: NodesOnObstacle<'_>) -> Result<Constraints> {
+    let (coordinates, dofs) = mesh::<D>(&given.coordinates, given.dofs.as_ref())?;
+    let nodes = indices(&given.nodes, "the list of nodes")?;
+    let body = obstacle::<D>(&given.obstacle)?;
+    let mut contact = contact::NodesOnObstacle::new(body, &coordinates, &dofs, &nodes)?
+        .with_law(named::law(&given.law)?)
+        .friction(given.friction);
+    if let Some(reach) = given.reach {
+        contact = contact.reach(reach)?;
+    }
+    if let Some(motion) = given.motion {
+        let at = move |t: f64| {
+            infallible([[f64::NAN; D]; 3], |py| {
+                arrays::rows(&motion.bind(py).call1((t,))?, "the motion of an obstacle")
+            })
+        };
+        contact = contact.moving(at);
+    }
+    Ok(vec![Box::new(contact)])
+}
+
+fn obstacle<const D: usize>(body: &Object<'_>) -> Result<Box<dyn contact::Obstacle<f64, D>>> {
+    let place = |name: &str| body.getattr(name).and_then(|value| point::<D>(&value, &format!("{name} of an obstacle")));
+    let number = |name: &str| body.getattr(name)?.extract::<f64>();
+    match &*body.get_type().name()?.to_string() {
+        "Plane" => Ok(Box::new(Plane::new(place("at")?, place("normal")?)?)),
+        "Sphere" => {
+            let side = if body.getattr("inside")?.is_truthy()? { Side::Inside } else { Side::Outside };
+            Ok(Box::new(Sphere::new(place("center")?, number("radius")?, side)?))
+        }
+        "Cuboid" => Ok(Box::new(Cuboid::new(place("center")?, place("half")?, number("rounding")?)?)),
+        "SignedDistance" => Ok(Box::new(body.extract::<SignedDistance>()?)),
+        name => {
+            let text = "expected Plane, Sphere, Cuboid or SignedDistance";
+            Err(refused(format!("an obstacle is of the type {name}, {text}")).into())
+        }
+    }
+}
+
+/// A body given by Python functions.
+#[derive(FromPyObject)]
+struct SignedDistance {
+    distance: Py<PyAny>,
+    gradient: Py<PyAny>,
+    curvature: Option<Py<PyAny>>,
+}
+
+impl<const D: usize> contact::Obstacle<f64, D> for SignedDistance {
+    fn distance(&self, x: [f64; D]) -> (f64, [f64; D]) {
+        infallible((f64::NAN, [f64::NAN; D]), |py| {
+            let (x, mut normal) = (PyArray1::from_slice(py, &x), [0.0; D]);
+            copy_into(&self.gradient.bind(py).call1((&x,))?, "the gradient of a distance", &mut normal)?;
+            Ok((self.distance.bind(py).call1((&x,))?.extract()?, normal))
+        })
+    }
+
+    fn curvature(&self, x: [f64; D], w: [f64; D]) -> f64 {
+        let Some(curvature) = &self.curvature else { return 0.0 };
+        infallible(f64::NAN, |py| {
+            let [x, w] = [x, w].map(|vector| PyArray1::from_slice(py, &vector));
+            curvature.bind(py).call1((x, w))?.extract()
+        })
+    }
+}
+
+/// `BodyContact` and `Tie`, which has no law and no friction.
+#[derive(FromPyObject)]
+struct Surfaces<'py> {
+    coordinates: Object<'py>,
+    slave: Object<'py>,
+    master: Option<Object<'py>>,
+    dofs: Option<Object<'py>>,
+    friction: f64,
+    law: Object<'py>,
+    reach: Option<f64>,
+}
+
+fn between_surfaces<const D: usize>(name: &str, given: Surfaces<'_>) -> Result<Constraints> {
+    let (coordinates, dofs) = mesh::<D>(&given.coordinates, given.dofs.as_ref())?;
+    let (slave, master) = (facets(&given.slave)?, given.master.as_ref().map(facets).transpose()?);
+    if name == "Tie" {
+        let tie = contact::Tie::new(&coordinates, &dofs, slave, master.unwrap_or_default())?;
+        return Ok(vec![Box::new(if let Some(reach) = given.reach { tie.reach(reach)? } else { tie })]);
+    }
+    let settings = SurfaceSettings::new().law(named::law(&given.law)?).friction(given.friction);
+    let contact = match master {
+        Some(master) => contact::BodyContact::new(&coordinates, &dofs, slave, master)?,
+        None => contact::BodyContact::of_itself(&coordinates, &dofs, slave)?,
+    };
+    Ok(contact.with(if let Some(reach) = given.reach { settings.reach(reach) } else { settings })?.constraints()?)
+}
+
+fn facets(value: &Object<'_>) -> PyResult<Vec<Facet>> {
+    let facet = |nodes: Vec<usize>| match nodes[..] {
+        [a, b] => Ok(Facet::from([a, b])),
+        [a, b, c] => Ok(Facet::from([a, b, c])),
+        [a, b, c, d] => Ok(Facet::from([a, b, c, d])),
+        _ => Err(refused(format!("a facet has {} nodes, expected 2, 3 or 4", nodes.len()))),
+    };
+    index_lists(value, "the facets")?.into_iter().map(facet).collect()
+}
+
+/// The outer sides of a mesh, with normals out of the cells: a list with one (m, k) array for facets of k nodes each.
+///
+/// coordinates: (n, 2) or (n, 3). cells: (c, nodes of a cell) integers, corners first, or a list of such arrays. Sides
+/// of cells of second order become several facets.
+#[pyfunction]
+pub(crate) fn outer_facets<'py>(coordinates: &Object<'py>, cells: &Object<'py>) -> Result<Vec<Object<'py>>> {
+    let (what, cells) = ("the coordinates", index_lists(cells, "the cells")?);
+    let surface = match shape(coordinates)?[..] {
+        [_, 2] => Surface::of_cells(&points::<2>(coordinates, what)?, cells)?,
+        _ => Surface::of_cells(&points::<3>(coordinates, what)?, cells)?,
+    };
+    let mut blocks: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
+    for facet in surface.facets() {
+        blocks.entry(facet.nodes().len()).or_default().push(facet.nodes().to_vec());
+    }
+    let array =
+        |rows: &Vec<Vec<usize>>| PyArray2::from_vec2(coordinates.py(), rows)?.call_method1("astype", ("int64",));
+    Ok(blocks.values().map(array).collect::<PyResult<_>>()?)
+}
+
+type Entries = BTreeMap<usize, f64>;
+
+/// Entries, gap, law, strength of a bond, friction and its tangents, as `LinearRows` keeps them.
+type Row<'py> = (Entries, Object<'py>, Object<'py>, Option<f64>, f64, Vec<Entries>);
+
+fn linear_rows(rows: Vec<Row<'_>>) -> Result<Rows<'static, f64>> {
+    let mut built = Rows::new();
+    for (entries, gap, law, strength, friction, tangents) in rows {
+        let offset = if gap.is_callable() {
+            let gap = gap.unbind();
+            GapOffset::moving(move |t| {
+                infallible([f64::NAN; 3], |py| {
+                    let mut offset = [0.0; 3];
+                    copy_into(&gap.bind(py).call1((t,))?, "the gap of a row", &mut offset)?;
+                    Ok(offset)
+                })
+            })
+        } else {
+            GapOffset::Constant(gap.extract()?)
+        };
+        let entries = Vec::from_iter(entries);
+        built = match (strength, &law) {
+            (Some(strength), _) => built.bond(strength, &entries, offset),
+            (None, law) if law.is_none() => built.equality(&entries, offset),
+            (None, law) => built.row(named::law(law)?, &entries, offset),
+        };
+        let tangents: Vec<Vec<_>> = tangents.into_iter().map(Vec::from_iter).collect();
+        match (friction != 0.0, tangents.is_empty()) {
+            (true, true) => return Err(refused(format!("a row has the friction {friction} but no tangents")).into()),
+            (true, false) => {
+                built = built.friction(friction, &tangents.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            }
+            (false, _) => {}
+        }
+    }
+    Ok(built)
+}

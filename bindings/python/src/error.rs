@@ -1,0 +1,75 @@
+//! Errors of the crate as Python exceptions.
+
+use contact_dynamics::Error;
+use pyo3::exceptions::{PyException, PyMemoryError, PyValueError};
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    contact_dynamics,
+    ContactDynamicsError,
+    PyException,
+    "A model, a start or a step that the library refuses, in its own words: docs/errors.md lists them with remedies. \
+     A step that fails leaves the simulation as it was."
+);
+pyo3::create_exception!(
+    contact_dynamics,
+    Inadmissible,
+    PyException,
+    "Raise it in a callback that cannot evaluate a trial state, for instance because an element is inverted: the step \
+     is undone, and repeated with half its size if `smallest_step` is given."
+);
+
+pub(crate) type Result<T, E = Fault> = std::result::Result<T, E>;
+
+/// An error of either side, on its way to Python.
+#[derive(Debug)]
+pub(crate) enum Fault {
+    Crate(Error),
+    Python(PyErr),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::Crate(error)
+    }
+}
+
+impl From<PyErr> for Fault {
+    fn from(error: PyErr) -> Self {
+        Self::Python(error)
+    }
+}
+
+impl From<Fault> for PyErr {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Python(error) => error,
+            // What a callback has raised is raised again, with its traceback.
+            Fault::Crate(Error::Host { callback, source }) => match source.downcast::<PyErr>() {
+                Ok(error) => *error,
+                Err(source) => exception(&Error::Host { callback, source }),
+            },
+            Fault::Crate(error) => exception(&error),
+        }
+    }
+}
+
+fn exception(error: &Error) -> PyErr {
+    let text = error.to_string();
+    match error {
+        Error::Dimension { .. }
+        | Error::Parameter { .. }
+        | Error::NotFinite { .. }
+        | Error::MatrixNotFinite { .. }
+        | Error::MissingDof { .. }
+        | Error::RepeatedDof { .. }
+        | Error::Empty { .. } => PyValueError::new_err(text),
+        Error::OutOfMemory { .. } => PyMemoryError::new_err(text),
+        _ => ContactDynamicsError::new_err(text),
+    }
+}
+
+/// A `ValueError`.
+pub(crate) fn refused(text: impl Into<String>) -> PyErr {
+    PyValueError::new_err(text.into())
+}

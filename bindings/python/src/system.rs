@@ -1,0 +1,232 @@
+//! Systems from their descriptions in Python (systems.py), and masses of presets.
+
+use crate::arrays::{copy_into, indices, matrix, shape, vector};
+use crate::callback::{fallible, infallible};
+use crate::error::{Result, refused};
+use crate::named;
+use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
+use contact_dynamics::{LinearSystem, Mass, System, TangentWeights, mass};
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+
+type Object<'py> = Bound<'py, PyAny>;
+type Linear = LinearSystem<'static, f64>;
+
+/// Vectors are lumped masses.
+enum Masses {
+    Lumped(Vec<f64>),
+    Consistent(SparseColMat<usize, f64>),
+}
+
+fn masses(given: &Object<'_>) -> Result<Masses> {
+    match shape(given)?.len() {
+        1 => Ok(Masses::Lumped(vector(given, "the mass")?)),
+        _ => Ok(Masses::Consistent(matrix(given, "the mass matrix")?)),
+    }
+}
+
+/// The attributes that both kinds of systems have.
+#[derive(FromPyObject)]
+#[expect(non_snake_case, reason = "the name of the literature")]
+struct Common<'py> {
+    M: Object<'py>,
+    load: Option<Object<'py>>,
+    fixed: Object<'py>,
+    driven: BTreeMap<usize, Py<PyAny>>,
+}
+
+/// A system of its own for a simulation.
+pub(crate) fn build(system: &Object<'_>) -> Result<Box<dyn System<f64>>> {
+    match &*system.get_type().name()?.to_string() {
+        "LinearSystem" => {
+            let mut linear = with_stiffness(system.extract()?, matrix(&system.getattr("K")?, "the stiffness matrix")?)?;
+            let (damping, rayleigh) = (system.getattr("C")?, system.getattr("rayleigh")?);
+            linear = match (damping.is_none(), rayleigh.is_none()) {
+                (true, true) => linear,
+                (false, true) => linear.damping(matrix(&damping, "the damping matrix")?)?,
+                (true, false) => {
+                    let (mass, stiffness) = rayleigh.extract()?;
+                    linear.rayleigh(mass, stiffness)?
+                }
+                (false, false) => {
+                    return Err(refused("C and rayleigh are both given; the damping is one of them").into());
+                }
+            };
+            Ok(Box::new(linear))
+        }
+        "NonlinearSystem" => {
+            let [force, tangent] = [system.getattr("internal_force")?, system.getattr("tangent")?];
+            let dofs = shape(&system.getattr("M")?)?.first().copied().unwrap_or(0);
+            let at_rest = tangent.call1((PyArray1::from_vec(system.py(), vec![0.0; dofs]),))?;
+            let linear = with_stiffness(system.extract()?, matrix(&at_rest, "the tangent")?)?;
+            let potential = Some(system.getattr("potential")?).filter(|given| !given.is_none()).map(Bound::unbind);
+            Ok(Box::new(Callbacks { linear, force: force.unbind(), tangent: tangent.unbind(), potential }))
+        }
+        name => {
+            let text = "expected LinearSystem or NonlinearSystem";
+            Err(refused(format!("the system is of the type {name}, {text}")).into())
+        }
+    }
+}
+
+fn with_stiffness(given: Common<'_>, stiffness: SparseColMat<usize, f64>) -> Result<Linear> {
+    let mut system = match masses(&given.M)? {
+        Masses::Lumped(mass) => Linear::lumped(mass, stiffness)?,
+        Masses::Consistent(mass) => Linear::new(mass, stiffness)?,
+    };
+    let dofs = system.dofs();
+    if let Some(load) = given.load {
+        system = if load.is_callable() {
+            let load = load.unbind();
+            system
+                .try_load(move |t, out| fallible("load", |py| copy_into(&load.bind(py).call1((t,))?, "the load", out)))
+        } else {
+            let load = vector(&load, "the load")?;
+            if load.len() != dofs {
+                return Err(refused(format!("the load has {} numbers, expected {dofs}", load.len())).into());
+            }
+            system.load(move |_, out| out.copy_from_slice(&load))
+        };
+    }
+    for dof in indices(&given.fixed, "the list of fixed dofs")? {
+        system = system.fix(dof)?;
+    }
+    for (dof, motion) in given.driven {
+        let at = move |t: f64| {
+            let mut values = [0.0; 3];
+            fallible("drive", |py| copy_into(&motion.bind(py).call1((t,))?, "the motion of a dof", &mut values))?;
+            Ok(values)
+        };
+        system = system.try_drive(dof, at)?;
+    }
+    Ok(system)
+}
+
+/// A system whose internal forces are Python functions; the linear one has the rest.
+struct Callbacks {
+    linear: Linear,
+    force: Py<PyAny>,
+    tangent: Py<PyAny>,
+    potential: Option<Py<PyAny>>,
+}
+
+impl System<f64> for Callbacks {
+    fn dofs(&self) -> usize {
+        self.linear.dofs()
+    }
+
+    fn mass(&self) -> Mass<'_, f64> {
+        self.linear.mass()
+    }
+
+    fn force(&mut self, t: f64, u: &[f64], _: &[f64], out: &mut [f64]) -> contact_dynamics::Result<()> {
+        let mut load = vec![0.0; out.len()];
+        self.linear.external_load(t, &mut load)?;
+        fallible("internal_force", |py| {
+            copy_into(&self.force.bind(py).call1((PyArray1::from_slice(py, u),))?, "the internal force", out)
+        })?;
+        out.iter_mut().zip(load).for_each(|(out, load)| *out = load - *out);
+        Ok(())
+    }
+
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
+        self.linear.pattern()
+    }
+
+    fn tangent(
+        &mut self,
+        _: f64,
+        u: &[f64],
+        _: &[f64],
+        weights: TangentWeights<f64>,
+        out: &mut [f64],
+    ) -> contact_dynamics::Result<()> {
+        let pattern = self.linear.pattern();
+        fallible("tangent", |py| {
+            let tangent = self.tangent.bind(py).call1((PyArray1::from_slice(py, u),))?;
+            scatter(&matrix(&tangent, "the tangent")?, pattern, weights.stiffness, out)
+        })
+    }
+
+    fn potential_energy(&mut self, u: &[f64]) -> Option<f64> {
+        let potential = self.potential.as_ref()?;
+        Some(infallible(f64::NAN, |py| potential.bind(py).call1((PyArray1::from_slice(py, u),))?.extract()))
+    }
+
+    fn external_load(&mut self, t: f64, out: &mut [f64]) -> contact_dynamics::Result<()> {
+        self.linear.external_load(t, out)
+    }
+
+    fn prescribed(&self) -> &[usize] {
+        self.linear.prescribed()
+    }
+
+    fn prescribed_motion(&mut self, t: f64, out: &mut [[f64; 3]]) -> contact_dynamics::Result<()> {
+        self.linear.prescribed_motion(t, out)
+    }
+}
+
+/// `out = weight · matrix`, in the order of a pattern that may have more entries.
+fn scatter(
+    matrix: &SparseColMat<usize, f64>,
+    pattern: SymbolicSparseColMatRef<'_, usize>,
+    weight: f64,
+    out: &mut [f64],
+) -> PyResult<()> {
+    if matrix.nrows() != pattern.nrows() {
+        return Err(refused(format!("the tangent has {} rows, expected {}", matrix.nrows(), pattern.nrows())));
+    }
+    out.fill(0.0);
+    for entry in matrix.as_ref().triplet_iter() {
+        let (row, column) = (entry.row, entry.col);
+        let Ok(place) = pattern.row_idx_of_col_raw(column).binary_search(&row) else {
+            let text = "is not among those of tangent(0): store it there";
+            return Err(refused(format!("the entry ({row}, {column}) of the tangent {text}")));
+        };
+        out[pattern.col_ptr()[column] + place] = weight * entry.val;
+    }
+    Ok(())
+}
+
+/// Courant numbers c h / h_e of all dofs for a step size h, (n). Explicit schemes are stable if all are at most 1.
+///
+/// M: (n) for a lumped mass, or (n, n) sparse. K: (n, n) sparse. step: h (time).
+#[pyfunction]
+#[expect(non_snake_case, reason = "the names of the literature")]
+pub(crate) fn courant<'py>(M: &Object<'py>, K: &Object<'py>, step: f64) -> Result<Bound<'py, PyArray1<f64>>> {
+    let (mass, k) = (masses(M)?, matrix(K, "the stiffness matrix")?);
+    let view = match &mass {
+        Masses::Lumped(mass) => Mass::Lumped(mass),
+        Masses::Consistent(mass) => Mass::Consistent(mass.as_ref()),
+    };
+    Ok(mass::courant(view, k.as_ref(), step)?.into_pyarray(M.py()))
+}
+
+/// The mass matrix that goes with a preset ("smooth", "conservative", "explicit"): a `scipy.sparse.csc_array`.
+///
+/// M, K: consistent mass and stiffness, (n, n) sparse.
+/// contact_dofs: dofs that become massless: of the contact nodes in the normal direction if it is along an axis,
+///     otherwise, and with friction, in all directions.
+/// groups: (n) integers, one number for each body and direction.
+/// courant: c h / h_e of the elements at the contact, see `courant`; at most 1 for "explicit".
+#[pyfunction]
+#[expect(non_snake_case, reason = "the names of the literature")]
+pub(crate) fn preset_mass<'py>(
+    name: &str,
+    M: &Object<'py>,
+    K: &Object<'py>,
+    contact_dofs: &Object<'py>,
+    groups: &Object<'py>,
+    courant: f64,
+) -> Result<Object<'py>> {
+    let py = M.py();
+    let missing = || refused(format!("there is no preset \"{name}\"; the names are smooth, conservative, explicit"));
+    let preset = named::preset(name).ok_or_else(missing)?;
+    let (mass, k) = (matrix(M, "the mass matrix")?, matrix(K, "the stiffness matrix")?);
+    let (contact, groups) = (indices(contact_dofs, "the contact dofs")?, indices(groups, "the groups")?);
+    let made = preset.mass(mass.as_ref(), k.symbolic(), &contact, &groups, courant)?;
+    let whole = |indices: &[usize]| PyArray1::from_slice(py, indices);
+    let arrays = (made.val().to_vec().into_pyarray(py), whole(made.row_idx()), whole(made.col_ptr()));
+    Ok(py.import("scipy.sparse")?.call_method1("csc_array", (arrays, (made.nrows(), made.ncols())))?)
+}

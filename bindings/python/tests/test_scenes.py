@@ -1,0 +1,179 @@
+"""Scenes with known results: closed forms, and integrations by SciPy that share no code with the library."""
+
+import contact_dynamics as cd
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scenes import EA, FORCE, RHO_A, WAVE, bar, plate
+from scipy.integrate import solve_ivp
+
+FREE = sp.csr_matrix((2, 2))
+
+
+def against_wall(n=40, step=1e-3, law="rigid", **options):
+    mass, stiffness = bar(n)
+    wall = cd.LinearRows().unilateral({n: -1.0}, 0.005, law=law)
+    return cd.Simulation(cd.LinearSystem(mass, stiffness), step, [wall], velocity=np.full(n + 1, 0.05), **options)
+
+
+def test_force_of_a_bar_at_a_wall_is_rho_c_a_v():
+    run = against_wall(energy="balance")
+    result = run.run(0.4, progress=False)
+    pressed = (result.times > 0.12) & (result.times < 0.28)
+    assert abs(result.contact_force[pressed] / FORCE - 1).max() < 0.05
+    assert abs(np.interp(0.2, result.times, result.contact_force) / FORCE - 1) < 0.01
+    assert result.contact_impulse.sum() == pytest.approx(bar(40)[0] @ (0.05 - run.velocity), rel=1e-12)
+    assert result.contact_impulse.sum() == pytest.approx(2 * RHO_A * 10 * 0.05, rel=0.02)  # it flies back as it came
+    balance = result.total - result.total[0] - sum(result.works.values())
+    assert abs(balance).max() < 1e-12 * result.total[0]
+    raw = against_wall(correction="none").run(0.4, progress=False)
+    assert raw.contact_force.max() > 1.5 * FORCE > 1.2 * result.contact_force.max()
+
+
+def test_bar_on_a_spring_is_that_of_scipy():
+    n, spring = 20, 2 * EA
+    mass, stiffness = bar(n)
+
+    def rate(_, state):
+        u, v = np.split(state, 2)
+        force = -(stiffness @ u)
+        force[n] -= spring * max(u[n] - 0.005, 0.0)
+        return np.concatenate([v, force / mass])
+
+    times = np.linspace(0, 0.4, 401)
+    start = np.concatenate([np.zeros(n + 1), np.full(n + 1, 0.05)])
+    other = solve_ivp(rate, (0, 0.4), start, t_eval=times, rtol=1e-10, atol=1e-13).y
+    law = {"name": "penalty", "stiffness": spring}
+    result = against_wall(n, step=1e-4, law=law, scheme="trapezoidal", dofs=[0, n]).run(0.4, progress=False)
+    assert abs(result.displacement[::10] - other[[0, n]].T).max() < 1e-4 * 0.02
+    force = spring * np.maximum(other[n] - 0.005, 0.0)
+    assert abs(result.contact_force[::10] - force).max() < 5e-3 * force.max()
+
+
+def test_nonlinear_oscillator_is_that_of_scipy():
+    system = cd.NonlinearSystem(
+        np.array([2.0]),
+        lambda u: 2 * u**3 + u,
+        lambda u: sp.csc_matrix([[6 * u[0] ** 2 + 1]]),
+        potential=lambda u: u[0] ** 4 / 2 + u[0] ** 2 / 2,
+    )
+    run = cd.Simulation(system, 1e-3, displacement=[1.0], dofs=[0], scheme="energy-momentum")
+    result = run.run(5.0, progress=False)
+    other = solve_ivp(
+        lambda _, y: [y[1], -(2 * y[0] ** 3 + y[0]) / 2], (0, 5), [1.0, 0.0], t_eval=result.times, rtol=1e-10, atol=1e-12
+    )
+    assert abs(result.displacement[:, 0] - other.y[0]).max() < 1e-5
+    assert abs(result.total / result.total[0] - 1).max() < 1e-9
+    assert run.statistics()["newton_iterations"] >= 5000
+
+
+@pytest.mark.parametrize("kind", ["rows", "plane", "function", "sinking"])
+def test_friction_stops_a_block_after_v2_over_2_mu_g(kind):
+    def contacts(mu):
+        if kind == "rows":
+            return [cd.LinearRows().unilateral({1: 1.0}, 0.0, friction=mu, tangents=[{0: 1.0}])]
+        floor = cd.Plane([0, 0], [0, 3])
+        if kind == "function":
+            floor = cd.SignedDistance(lambda x: x[1], lambda x: [0, 1])
+        motion = (lambda t: [[0, -0.1 * t], [0, -0.1], [0, 0]]) if kind == "sinking" else None
+        return [cd.NodesOnObstacle(floor, [[0.0, 0.0]], [0], friction=mu, motion=motion)]
+
+    # A particle of 2 kg at the origin under gravity of 10 m/s², thrown along x.
+    system = cd.LinearSystem([2.0, 2.0], FREE, load=[0.0, -20.0])
+    down = -0.1 if kind == "sinking" else 0.0
+    run = cd.Simulation(system, 0.01, contacts(0.25), velocity=[1.0, down], dofs=[0, 1])
+    result = run.run(1.0, progress=False)
+    assert result.displacement[-1, 0] == pytest.approx(0.2, abs=1e-12)
+    assert result.friction_force[20] == pytest.approx(5.0, abs=1e-10)
+    assert result.displacement[-1, 1] == pytest.approx(down, abs=1e-12)
+    contact = run.contacts()[0]
+    assert contact.status == "sticking" and contact.force == pytest.approx(20.0)
+    assert run.contact_forces() == pytest.approx([0.0, 20.0], abs=1e-9)
+
+
+def test_a_round_bowl_by_functions_is_the_one_of_the_library():
+    def slide(bowl):
+        contact = cd.NodesOnObstacle(bowl, [[0.0, -1.0]], [0])
+        system = cd.LinearSystem([2.0, 2.0], FREE, load=[0.0, -20.0])
+        return cd.Simulation(system, 1e-3, [contact], velocity=[1.0, 0.0]).run(0.5, progress=False).contact_force
+
+    by_function = cd.SignedDistance(
+        lambda x: 1 - np.hypot(*x), lambda x: -x / np.hypot(*x), lambda x, w: -((x[0] * w[1] - x[1] * w[0]) ** 2)
+    )
+    force = slide(cd.Sphere([0, 0], 1.0, inside=True))
+    assert force[1] == pytest.approx(22.0, rel=1e-3)  # m (g + v²/R)
+    assert slide(by_function) == pytest.approx(force, rel=1e-5)
+
+
+def two_plates(cells=4, gap=0.01):
+    """Two equal plates, the second above the first: coordinates, mass, stiffness, cells of both."""
+    coordinates, mass, stiffness = plate(cells)
+    at = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+    both = np.vstack([coordinates, coordinates + [0.03, 1 + gap]])
+    return both, np.tile(mass, 2), sp.block_diag([stiffness, stiffness], format="csr"), [quads, quads + at.size]
+
+
+def test_two_bodies_exchange_momentum():
+    coordinates, mass, stiffness, (lower, upper) = two_plates()
+    surfaces = [cd.outer_facets(coordinates, cells) for cells in (upper, lower)]
+    assert [facets[0].shape for facets in surfaces] == [(16, 2), (16, 2)]
+    contact = cd.BodyContact(coordinates, *surfaces, friction=0.1)
+    velocity = np.zeros(mass.size)
+    velocity[mass.size // 2 + 1 :: 2] = -1.0
+    run = cd.Simulation(cd.LinearSystem(mass, stiffness), 1e-4, [contact], velocity=velocity, energy="balance")
+    result = run.run(0.03, progress=False)
+    momentum = (mass * run.velocity).reshape(2, -1, 2).sum(axis=1)
+    assert result.contact_force.max() > 0.0
+    assert momentum.sum(axis=0) == pytest.approx([0.0, -1000.0], abs=1e-8)
+    assert momentum[0, 1] < -500.0  # the lower one has been struck downward
+    assert result.total[-1] <= result.total[0]
+    alone = cd.BodyContact(coordinates, surfaces[0] + surfaces[1])
+    assert cd.Simulation(cd.LinearSystem(mass, stiffness), 1e-4, [alone]).contacts() is not None
+
+
+def test_tied_bodies_stay_together():
+    coordinates, mass, stiffness, (lower, upper) = two_plates(gap=0.0)
+    tie = cd.Tie(coordinates, *(cd.outer_facets(coordinates, cells) for cells in (upper, lower)))
+    velocity = np.zeros(mass.size)
+    velocity[mass.size // 2 + 1 :: 2] = 1.0
+    run = cd.Simulation(cd.LinearSystem(mass, stiffness), 1e-4, [tie], velocity=velocity)
+    run.run(0.02, progress=False)
+    # After half of a period of the two as one bar, 2 L/c, the lower one has nearly all of the momentum.
+    lower, upper = (mass * run.velocity).reshape(2, -1, 2).sum(axis=1)[:, 1] / 1000.0
+    assert lower > 0.8 and lower + upper == pytest.approx(1.0, abs=1e-9)
+
+
+def test_supports_loads_and_rows_that_move():
+    # A spring of stiffness 9 between a driven dof and a mass of 1, statically slow; reaction and balance.
+    stiffness = sp.csc_matrix([[9.0, -9.0], [-9.0, 9.0]])
+    driven = {0: lambda t: (0.1, 0.0, 0.0)}
+    system = cd.LinearSystem([1.0, 1.0], stiffness, rayleigh=(0.0, 0.1), load=lambda t: [0.0, 0.9], driven=driven)
+    run = cd.Simulation(system, 0.01, displacement=[0.1, 0.1], start_at_rest=True)
+    run.run(1.0, progress=False, record=False)
+    assert run.displacement == pytest.approx([0.1, 0.2]) and run.reactions() == pytest.approx([-0.9])
+    table = cd.LinearRows().unilateral({1: 1.0}, lambda t: (0.0, -0.5, 0.0) if t == 0 else (-0.5 * t, -0.5, 0.0))
+    lifted = cd.Simulation(cd.LinearSystem([1.0, 1.0], FREE, fixed=[0]), 0.01, [table], velocity=[0.0, 0.5])
+    lifted.run(1.0, progress=False)
+    assert lifted.displacement[1] == pytest.approx(0.5)
+
+
+def test_presets_bring_mass_and_correction():
+    n = 50
+    _, stiffness = bar(n)
+    size = 10.0 / n
+    consistent = sp.diags([np.full(n + 1, 4.0), np.ones(n), np.ones(n)], [0, 1, -1]).tolil() * (RHO_A * size / 6)
+    consistent[0, 0] = consistent[n, n] = RHO_A * size / 3
+    step = 0.5 * size / WAVE
+    forces = {}
+    for name in ("smooth", "conservative", "explicit"):
+        courant = cd.courant(consistent, stiffness, step)[n]
+        assert courant == pytest.approx(0.5)
+        mass = cd.preset_mass(name, consistent, stiffness, [n], np.zeros(n + 1, dtype=int), courant)
+        assert mass[n, n] == 0.0 and mass.sum() == pytest.approx(RHO_A * 10)
+        wall = cd.LinearRows().unilateral({n: -1.0}, 0.005)
+        options = {"scheme": name, "velocity": np.full(n + 1, 0.05)}
+        result = cd.Simulation(cd.LinearSystem(mass, stiffness), step, [wall], **options).run(0.4, progress=False)
+        assert result.total[-1] / result.total[0] == pytest.approx(1.0, abs=0.01)
+        forces[name] = np.interp(0.2, result.times, result.contact_force)
+    assert list(forces.values()) == pytest.approx([FORCE] * 3, rel=0.05)
