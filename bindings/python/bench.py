@@ -29,7 +29,8 @@ def pressed_plate(cells):
 
 
 def measure(name, run, steps, samples):
-    step = run.step_size
+    run.step()
+    step = run.time
     times = {"run": [], "step": []}
     for _ in range(samples):
         until, begin = run.time + (steps - 0.5) * step, time.perf_counter()

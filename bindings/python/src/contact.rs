@@ -1,7 +1,7 @@
 //! Constraints and obstacles from their descriptions in Python (contacts.py).
 
-use crate::arrays::{self, copy_into, index_lists, index_rows, indices, point, points, shape};
-use crate::callback::infallible;
+use crate::arrays::{ANY, floats, indices, rows, shape};
+use crate::callback::{fill, infallible};
 use crate::error::{Result, refused};
 use crate::named;
 use contact_dynamics::LinearRows as Rows;
@@ -39,11 +39,10 @@ pub(crate) fn build(contact: &Object<'_>) -> Result<Constraints> {
 type Mesh<const D: usize> = (Vec<[f64; D]>, Vec<[usize; D]>);
 
 fn mesh<const D: usize>(coordinates: &Object<'_>, dofs: Option<&Object<'_>>) -> PyResult<Mesh<D>> {
-    let coordinates = points(coordinates, "the coordinates")?;
-    let numbered = |node| std::array::from_fn(|axis| node * D + axis);
-    let all = || Ok((0..coordinates.len()).map(numbered).collect());
-    let dofs = dofs.map_or_else(all, |dofs| index_rows(dofs, "the dofs of the nodes"))?;
-    Ok((coordinates, dofs))
+    let coordinates = rows(&floats(coordinates, "the coordinates", &[ANY, D])?);
+    let all = || Ok((0..D * coordinates.len()).collect());
+    let dofs = dofs.map_or_else(all, |dofs| indices(dofs, "the dofs of the nodes", &[ANY, D]))?;
+    Ok((coordinates, rows(&dofs)))
 }
 
 #[derive(FromPyObject)]
@@ -60,7 +59,7 @@ struct NodesOnObstacle<'py> {
 
 fn nodes_on_obstacle<const D: usize>(given: NodesOnObstacle<'_>) -> Result<Constraints> {
     let (coordinates, dofs) = mesh::<D>(&given.coordinates, given.dofs.as_ref())?;
-    let nodes = indices(&given.nodes, "the list of nodes")?;
+    let nodes = indices(&given.nodes, "the list of nodes", &[ANY])?;
     let body = obstacle::<D>(&given.obstacle)?;
     let mut contact = contact::NodesOnObstacle::new(body, &coordinates, &dofs, &nodes)?
         .with_law(named::law(&given.law)?)
@@ -69,18 +68,21 @@ fn nodes_on_obstacle<const D: usize>(given: NodesOnObstacle<'_>) -> Result<Const
         contact = contact.reach(reach)?;
     }
     if let Some(motion) = given.motion {
-        let at = move |t: f64| {
+        contact = contact.moving(move |t| {
             infallible([[f64::NAN; D]; 3], |py| {
-                arrays::rows(&motion.bind(py).call1((t,))?, "the motion of an obstacle")
+                let values = floats(&motion.bind(py).call1((t,))?, "the motion of an obstacle", &[3, D])?;
+                Ok(std::array::from_fn(|row| std::array::from_fn(|axis| values[row * D + axis])))
             })
-        };
-        contact = contact.moving(at);
+        });
     }
     Ok(vec![Box::new(contact)])
 }
 
 fn obstacle<const D: usize>(body: &Object<'_>) -> Result<Box<dyn contact::Obstacle<f64, D>>> {
-    let place = |name: &str| body.getattr(name).and_then(|value| point::<D>(&value, &format!("{name} of an obstacle")));
+    let place = |name: &str| -> PyResult<[f64; D]> {
+        let values = floats(&body.getattr(name)?, &format!("{name} of an obstacle"), &[D])?;
+        Ok(std::array::from_fn(|axis| values[axis]))
+    };
     let number = |name: &str| body.getattr(name)?.extract::<f64>();
     match &*body.get_type().name()?.to_string() {
         "Plane" => Ok(Box::new(Plane::new(place("at")?, place("normal")?)?)),
@@ -109,7 +111,7 @@ impl<const D: usize> contact::Obstacle<f64, D> for SignedDistance {
     fn distance(&self, x: [f64; D]) -> (f64, [f64; D]) {
         infallible((f64::NAN, [f64::NAN; D]), |py| {
             let (x, mut normal) = (PyArray1::from_slice(py, &x), [0.0; D]);
-            copy_into(&self.gradient.bind(py).call1((&x,))?, "the gradient of a distance", &mut normal)?;
+            fill(&self.gradient, py, (&x,), ("the gradient of a distance", &mut normal))?;
             Ok((self.distance.bind(py).call1((&x,))?.extract()?, normal))
         })
     }
@@ -150,6 +152,20 @@ fn between_surfaces<const D: usize>(name: &str, given: Surfaces<'_>) -> Result<C
     Ok(contact.with(if let Some(reach) = given.reach { settings.reach(reach) } else { settings })?.constraints()?)
 }
 
+/// Lists of nodes: an array of shape (n, any), or a list of such arrays.
+fn lists(value: &Object<'_>, what: &str) -> PyResult<Vec<Vec<usize>>> {
+    let blocks: Vec<Object<'_>> = match value.get_item(0) {
+        Ok(first) if shape(&first)?.len() == 2 => value.try_iter()?.collect::<PyResult<_>>()?,
+        _ => vec![value.clone()],
+    };
+    let mut lists = Vec::new();
+    for block in blocks {
+        let nodes = indices(&block, what, &[ANY, ANY])?;
+        lists.extend(nodes.chunks_exact(shape(&block)?[1].max(1)).map(<[usize]>::to_vec));
+    }
+    Ok(lists)
+}
+
 fn facets(value: &Object<'_>) -> PyResult<Vec<Facet>> {
     let facet = |nodes: Vec<usize>| match nodes[..] {
         [a, b] => Ok(Facet::from([a, b])),
@@ -157,7 +173,7 @@ fn facets(value: &Object<'_>) -> PyResult<Vec<Facet>> {
         [a, b, c, d] => Ok(Facet::from([a, b, c, d])),
         _ => Err(refused(format!("a facet has {} nodes, expected 2, 3 or 4", nodes.len()))),
     };
-    index_lists(value, "the facets")?.into_iter().map(facet).collect()
+    lists(value, "the facets")?.into_iter().map(facet).collect()
 }
 
 /// The outer sides of a mesh, with normals out of the cells: a list with one (m, k) array for facets of k nodes each.
@@ -166,10 +182,10 @@ fn facets(value: &Object<'_>) -> PyResult<Vec<Facet>> {
 /// of cells of second order become several facets.
 #[pyfunction]
 pub(crate) fn outer_facets<'py>(coordinates: &Object<'py>, cells: &Object<'py>) -> Result<Vec<Object<'py>>> {
-    let (what, cells) = ("the coordinates", index_lists(cells, "the cells")?);
+    let cells = lists(cells, "the cells")?;
     let surface = match shape(coordinates)?[..] {
-        [_, 2] => Surface::of_cells(&points::<2>(coordinates, what)?, cells)?,
-        _ => Surface::of_cells(&points::<3>(coordinates, what)?, cells)?,
+        [_, 2] => Surface::of_cells(&mesh::<2>(coordinates, None)?.0, cells)?,
+        _ => Surface::of_cells(&mesh::<3>(coordinates, None)?.0, cells)?,
     };
     let mut blocks: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
     for facet in surface.facets() {
@@ -193,7 +209,7 @@ fn linear_rows(rows: Vec<Row<'_>>) -> Result<Rows<'static, f64>> {
             GapOffset::moving(move |t| {
                 infallible([f64::NAN; 3], |py| {
                     let mut offset = [0.0; 3];
-                    copy_into(&gap.bind(py).call1((t,))?, "the gap of a row", &mut offset)?;
+                    fill(&gap, py, (t,), ("the gap of a row", &mut offset))?;
                     Ok(offset)
                 })
             })

@@ -24,5 +24,5 @@ mod _core {
     #[pymodule_export]
     use crate::run::Run;
     #[pymodule_export]
-    use crate::system::{courant, preset_mass};
+    use crate::system::preset_mass;
 }

@@ -1,15 +1,13 @@
 //! Schemes, contact laws, corrections and solvers by name: the names of the program from-matrices.
 
 use crate::error::{Result, refused};
-use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, WorkBalance, ZeroAcceleration,
 };
 use contact_dynamics::{
-    ActiveSet, Automatic, Bathe, Bdf2, ByBody, CdLagrange, CentralDifference, Cholesky, ChungLee, Composite,
-    ConjugateGradients, ContactLaw, ContactSolver, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, Houbolt,
-    HulbertChung, LinearSolver, Lu, MoreauJean, Newmark, NohBathe, Oalts, Park, PersistencyCorrection, Preset,
-    TchamwaWielgosz, TimeIntegrator,
+    Automatic, Bathe, Bdf2, ByBody, CdLagrange, CentralDifference, Cholesky, ChungLee, Composite, ConjugateGradients,
+    ContactLaw, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, Houbolt, HulbertChung, LinearSolver, Lu,
+    MoreauJean, Newmark, NohBathe, Oalts, Park, PersistencyCorrection, Preset, TchamwaWielgosz, TimeIntegrator,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -151,14 +149,4 @@ pub(crate) fn linear_solver(value: &Bound<'_, PyAny>) -> Result<Box<dyn LinearSo
         ("by-body", &[], |_| Ok(Box::new(ByBody::default()))),
     ];
     read("linear solver", SOLVERS, value)
-}
-
-pub(crate) fn contact_solver(value: &Bound<'_, PyAny>) -> Result<Box<dyn ContactSolver<f64>>> {
-    const SOLVERS: &[Named<Box<dyn ContactSolver<f64>>>] = &[
-        ("active-set", &[], |_| Ok(Box::new(ActiveSet::default()))),
-        ("pivoting", &[], |_| Ok(Box::new(Pivoting::default()))),
-        ("gauss-seidel", &[], |_| Ok(Box::new(GaussSeidel::default()))),
-        ("projected-gradient", &[], |_| Ok(Box::new(ProjectedGradient::default()))),
-    ];
-    read("contact solver", SOLVERS, value)
 }

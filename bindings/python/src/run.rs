@@ -1,14 +1,14 @@
 //! A simulation, its steps and its state.
 
-use crate::arrays::{indices, vector};
+use crate::arrays::{ANY, floats, indices};
 use crate::callback::detached;
 use crate::error::{Result, refused};
-use crate::record::{Recorder, Watch, works_by_name};
+use crate::record::{Recorder, Watch};
 use crate::{contact, named, system};
 use contact_dynamics::{InitialOverclosure, Outcome, Simulation, StepControl};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyBytes, PyDict};
+use pyo3::types::{PyBytes, PyDict};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,6 @@ struct Options<'py> {
     scheme: Bound<'py, PyAny>,
     correction: Bound<'py, PyAny>,
     linear_solver: Bound<'py, PyAny>,
-    contact_solver: Bound<'py, PyAny>,
     start_time: f64,
     displacement: Option<Bound<'py, PyAny>>,
     velocity: Option<Bound<'py, PyAny>>,
@@ -55,7 +54,7 @@ impl Run {
         options: Options<'_>,
     ) -> Result<Self> {
         let system = system::build(system)?;
-        let (count, recorded) = (system.dofs(), indices(&options.dofs, "the list of recorded dofs")?);
+        let (count, recorded) = (system.dofs(), indices(&options.dofs, "the list of recorded dofs", &[ANY])?);
         if let Some(dof) = recorded.iter().find(|&&dof| dof >= count) {
             return Err(refused(format!("the list of recorded dofs names dof {dof} of {count}")).into());
         }
@@ -63,7 +62,6 @@ impl Run {
         let mut builder = Simulation::builder(system, integrator, options.step)
             .start_time(options.start_time)
             .linear_solver(named::linear_solver(&options.linear_solver)?)
-            .contact_solver(named::contact_solver(&options.contact_solver)?)
             .initial_overclosure(overclosure(&options.overlap)?);
         if let Some(correctors) = named::correctors(&options.correction)?.or(of_preset) {
             builder = builder.correctors(correctors);
@@ -72,18 +70,15 @@ impl Run {
             builder = builder.constraints(contact::build(contact)?);
         }
         if let Some(u) = &options.displacement {
-            builder = builder.displacement(vector(u, "the displacement")?);
+            builder = builder.displacement(floats(u, "the displacement", &[count])?);
         }
         if let Some(v) = &options.velocity {
-            builder = builder.velocity(vector(v, "the velocity")?);
+            builder = builder.velocity(floats(v, "the velocity", &[count])?);
         }
-        match (options.smallest_step, options.local_error) {
-            (None, None) => {}
-            (None, Some(_)) => return Err(refused("local_error is given without smallest_step").into()),
-            (Some(smallest), None) => builder = builder.step_control(StepControl::halving(smallest)?),
-            (Some(smallest), Some(error)) => {
-                builder = builder.step_control(StepControl::halving(smallest)?.local_error(error)?);
-            }
+        if let Some(smallest) = options.smallest_step {
+            let control = StepControl::halving(smallest)?;
+            let error = options.local_error.map(|error| control.local_error(error));
+            builder = builder.step_control(error.unwrap_or(Ok(control))?);
         }
         if options.start_at_rest {
             builder = builder.start_at_rest();
@@ -134,11 +129,6 @@ impl Run {
         self.run().time()
     }
 
-    #[getter]
-    fn step_size(&mut self) -> f64 {
-        self.run().step_size()
-    }
-
     /// A vector of the state by its name.
     fn vector<'py>(&mut self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyArray1<f64>>> {
         let run = self.run();
@@ -169,28 +159,8 @@ impl Run {
         self.run().contact_forces().map(contact).collect()
     }
 
-    fn energy<'py>(&mut self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let run = self.run();
-        let energy = detached(py, || Ok(run.energy()))?;
-        let values = [("kinetic", Some(energy.kinetic)), ("potential", energy.potential)].into_py_dict(py)?;
-        for (name, work) in energy.works.iter().flat_map(works_by_name) {
-            values.set_item(name, work)?;
-        }
-        Ok(values)
-    }
-
-    fn statistics<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counts = *self.run().statistics();
-        let all = [
-            ("steps", counts.steps),
-            ("linear_solves", counts.linear_solves),
-            ("newton_iterations", counts.newton_iterations),
-            ("factorizations", counts.factorizations),
-            ("contact_solves", counts.contact_solves),
-            ("contact_changes", counts.contact_changes),
-            ("refused_steps", counts.refused_steps),
-        ];
-        all.into_py_dict(py)
+    fn __repr__(&mut self) -> String {
+        format!("{:?}", self.run())
     }
 
     fn checkpoint<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

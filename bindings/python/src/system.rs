@@ -1,30 +1,17 @@
 //! Systems from their descriptions in Python (systems.py), and masses of presets.
 
-use crate::arrays::{copy_into, indices, matrix, shape, vector};
-use crate::callback::{fallible, infallible};
+use crate::arrays::{ANY, floats, indices, matrix, shape};
+use crate::callback::{fallible, fill, infallible};
 use crate::error::{Result, refused};
 use crate::named;
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{LinearSystem, Mass, System, TangentWeights, mass};
-use numpy::{IntoPyArray, PyArray1};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
 type Object<'py> = Bound<'py, PyAny>;
 type Linear = LinearSystem<'static, f64>;
-
-/// Vectors are lumped masses.
-enum Masses {
-    Lumped(Vec<f64>),
-    Consistent(SparseColMat<usize, f64>),
-}
-
-fn masses(given: &Object<'_>) -> Result<Masses> {
-    match shape(given)?.len() {
-        1 => Ok(Masses::Lumped(vector(given, "the mass")?)),
-        _ => Ok(Masses::Consistent(matrix(given, "the mass matrix")?)),
-    }
-}
 
 /// The attributes that both kinds of systems have.
 #[derive(FromPyObject)]
@@ -71,31 +58,26 @@ pub(crate) fn build(system: &Object<'_>) -> Result<Box<dyn System<f64>>> {
 }
 
 fn with_stiffness(given: Common<'_>, stiffness: SparseColMat<usize, f64>) -> Result<Linear> {
-    let mut system = match masses(&given.M)? {
-        Masses::Lumped(mass) => Linear::lumped(mass, stiffness)?,
-        Masses::Consistent(mass) => Linear::new(mass, stiffness)?,
+    let mut system = match shape(&given.M)?.len() {
+        1 => Linear::lumped(floats(&given.M, "the mass", &[ANY])?, stiffness)?,
+        _ => Linear::new(matrix(&given.M, "the mass matrix")?, stiffness)?,
     };
-    let dofs = system.dofs();
     if let Some(load) = given.load {
         system = if load.is_callable() {
             let load = load.unbind();
-            system
-                .try_load(move |t, out| fallible("load", |py| copy_into(&load.bind(py).call1((t,))?, "the load", out)))
+            system.try_load(move |t, out| fallible("load", |py| fill(&load, py, (t,), ("the load", out))))
         } else {
-            let load = vector(&load, "the load")?;
-            if load.len() != dofs {
-                return Err(refused(format!("the load has {} numbers, expected {dofs}", load.len())).into());
-            }
+            let load = floats(&load, "the load", &[system.dofs()])?;
             system.load(move |_, out| out.copy_from_slice(&load))
         };
     }
-    for dof in indices(&given.fixed, "the list of fixed dofs")? {
+    for dof in indices(&given.fixed, "the list of fixed dofs", &[ANY])? {
         system = system.fix(dof)?;
     }
     for (dof, motion) in given.driven {
         let at = move |t: f64| {
             let mut values = [0.0; 3];
-            fallible("drive", |py| copy_into(&motion.bind(py).call1((t,))?, "the motion of a dof", &mut values))?;
+            fallible("drive", |py| fill(&motion, py, (t,), ("the motion of a dof", &mut values)))?;
             Ok(values)
         };
         system = system.try_drive(dof, at)?;
@@ -124,7 +106,7 @@ impl System<f64> for Callbacks {
         let mut load = vec![0.0; out.len()];
         self.linear.external_load(t, &mut load)?;
         fallible("internal_force", |py| {
-            copy_into(&self.force.bind(py).call1((PyArray1::from_slice(py, u),))?, "the internal force", out)
+            fill(&self.force, py, (PyArray1::from_slice(py, u),), ("the internal force", out))
         })?;
         out.iter_mut().zip(load).for_each(|(out, load)| *out = load - *out);
         Ok(())
@@ -189,44 +171,31 @@ fn scatter(
     Ok(())
 }
 
-/// Courant numbers c h / h_e of all dofs for a step size h, (n). Explicit schemes are stable if all are at most 1.
-///
-/// M: (n) for a lumped mass, or (n, n) sparse. K: (n, n) sparse. step: h (time).
-#[pyfunction]
-#[expect(non_snake_case, reason = "the names of the literature")]
-pub(crate) fn courant<'py>(M: &Object<'py>, K: &Object<'py>, step: f64) -> Result<Bound<'py, PyArray1<f64>>> {
-    let (mass, k) = (masses(M)?, matrix(K, "the stiffness matrix")?);
-    let view = match &mass {
-        Masses::Lumped(mass) => Mass::Lumped(mass),
-        Masses::Consistent(mass) => Mass::Consistent(mass.as_ref()),
-    };
-    Ok(mass::courant(view, k.as_ref(), step)?.into_pyarray(M.py()))
-}
-
 /// The mass matrix that goes with a preset ("smooth", "conservative", "explicit"): a `scipy.sparse.csc_array`.
 ///
-/// M, K: consistent mass and stiffness, (n, n) sparse.
+/// M, K: consistent mass and stiffness, (n, n) sparse. step: the step size of the run (time).
 /// contact_dofs: dofs that become massless: of the contact nodes in the normal direction if it is along an axis,
 ///     otherwise, and with friction, in all directions.
 /// groups: (n) integers, one number for each body and direction.
-/// courant: c h / h_e of the elements at the contact, see `courant`; at most 1 for "explicit".
 #[pyfunction]
 #[expect(non_snake_case, reason = "the names of the literature")]
 pub(crate) fn preset_mass<'py>(
     name: &str,
     M: &Object<'py>,
     K: &Object<'py>,
+    step: f64,
     contact_dofs: &Object<'py>,
     groups: &Object<'py>,
-    courant: f64,
 ) -> Result<Object<'py>> {
-    let py = M.py();
     let missing = || refused(format!("there is no preset \"{name}\"; the names are smooth, conservative, explicit"));
     let preset = named::preset(name).ok_or_else(missing)?;
     let (mass, k) = (matrix(M, "the mass matrix")?, matrix(K, "the stiffness matrix")?);
-    let (contact, groups) = (indices(contact_dofs, "the contact dofs")?, indices(groups, "the groups")?);
+    let contact = indices(contact_dofs, "the contact dofs", &[ANY])?;
+    let courant = mass::courant(Mass::Consistent(mass.as_ref()), k.as_ref(), step)?;
+    let courant = contact.iter().filter_map(|&dof| courant.get(dof)).fold(0.0, |largest, &c| f64::max(largest, c));
+    let groups = indices(groups, "the groups", &[mass.nrows()])?;
     let made = preset.mass(mass.as_ref(), k.symbolic(), &contact, &groups, courant)?;
-    let whole = |indices: &[usize]| PyArray1::from_slice(py, indices);
-    let arrays = (made.val().to_vec().into_pyarray(py), whole(made.row_idx()), whole(made.col_ptr()));
-    Ok(py.import("scipy.sparse")?.call_method1("csc_array", (arrays, (made.nrows(), made.ncols())))?)
+    let list = |indices: &[usize]| PyArray1::from_slice(M.py(), indices);
+    let arrays = (PyArray1::from_slice(M.py(), made.val()), list(made.row_idx()), list(made.col_ptr()));
+    Ok(M.py().import("scipy.sparse")?.call_method1("csc_array", (arrays, (made.nrows(), made.ncols())))?)
 }

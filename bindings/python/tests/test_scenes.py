@@ -64,7 +64,6 @@ def test_nonlinear_oscillator_is_that_of_scipy():
     )
     assert abs(result.displacement[:, 0] - other.y[0]).max() < 1e-5
     assert abs(result.total / result.total[0] - 1).max() < 1e-9
-    assert run.statistics()["newton_iterations"] >= 5000
 
 
 @pytest.mark.parametrize("kind", ["rows", "plane", "function", "sinking"])
@@ -167,9 +166,7 @@ def test_presets_bring_mass_and_correction():
     step = 0.5 * size / WAVE
     forces = {}
     for name in ("smooth", "conservative", "explicit"):
-        courant = cd.courant(consistent, stiffness, step)[n]
-        assert courant == pytest.approx(0.5)
-        mass = cd.preset_mass(name, consistent, stiffness, [n], np.zeros(n + 1, dtype=int), courant)
+        mass = cd.preset_mass(name, consistent, stiffness, step, [n], np.zeros(n + 1, dtype=int))
         assert mass[n, n] == 0.0 and mass.sum() == pytest.approx(RHO_A * 10)
         wall = cd.LinearRows().unilateral({n: -1.0}, 0.005)
         options = {"scheme": name, "velocity": np.full(n + 1, 0.05)}

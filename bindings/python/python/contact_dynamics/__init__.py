@@ -15,7 +15,7 @@ between bodies that are apart. Arrays with wrong shapes or numbers raise ValueEr
 refuses raises ContactDynamicsError.
 """
 
-from ._core import ContactDynamicsError, Inadmissible, courant, outer_facets, preset_mass
+from ._core import ContactDynamicsError, Inadmissible, outer_facets, preset_mass
 from .contacts import BodyContact, Cuboid, LinearRows, NodesOnObstacle, Plane, SignedDistance, Sphere, Tie
 from .plotting import plot
 from .result import Result
@@ -24,4 +24,4 @@ from .systems import LinearSystem, NonlinearSystem
 
 __all__ = ["BodyContact", "Contact", "ContactDynamicsError", "Cuboid", "Inadmissible", "LinearRows", "LinearSystem"]
 __all__ += ["NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere", "Tie"]
-__all__ += ["courant", "outer_facets", "plot", "preset_mass"]
+__all__ += ["outer_facets", "plot", "preset_mass"]

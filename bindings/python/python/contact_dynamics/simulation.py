@@ -19,28 +19,25 @@ PAUSE = 0.1
 
 
 class Contact(NamedTuple):
-    """A contact of a state."""
+    """A contact of a state.
+
+    constraint: index of its constraint; a BodyContact makes several. feature: the row of LinearRows, or the node.
+    candidate: what is opposite to the feature, if there are several.
+    status: "open", "touching", "closed", "sticking" or "sliding". gap: length, negative if bodies overlap.
+    force: normal force, compression positive. friction, slip: forces and slip velocities along the tangents.
+    position, normal: place in space, and direction in which the gap opens, (3), if known.
+    """
 
     constraint: int
-    """Index of its constraint. A BodyContact makes several."""
     feature: int
-    """The row of LinearRows, or the node."""
     candidate: int
-    """What is opposite to the feature, if there are several."""
     status: str
-    """ "open", "touching", "closed", "sticking" or "sliding"."""
     gap: float
-    """Length, negative if bodies overlap."""
     force: float
-    """Normal force, compression positive."""
     friction: list[float]
-    """Friction forces along the tangents; empty without friction."""
     slip: list[float]
-    """Slip velocities along the tangents."""
     position: list[float] | None
-    """Place in space, if known."""
     normal: list[float] | None
-    """Direction in which the gap opens, if known."""
 
 
 class Simulation:
@@ -53,8 +50,8 @@ class Simulation:
         1), "trapezoidal", "newmark" (beta = 0.25, 0 to 1; gamma = 0.5, 0.5 to 1), "composite", "bathe" (rho = 0, 0 to
         1), "houbolt", "park", "bdf2", "oalts" (rho = 0.5, 0 to 1), "gssss" (0 ≤ rho_3 ≤ rho_1 ≤ rho_2 ≤ 1, all 0.8),
         "moreau-jean" (theta = 0.5, 0.5 to 1), "energy-momentum"; explicit, for lumped masses and steps below the
-        stability limit: "central-difference", "cd-lagrange", "tchamwa-wielgosz" (phi = 1.033, 1 to 2), "chung-lee"
-        (beta = 28/27, 1 to 28/27), "hulbert-chung" (rho = 0.8, 0 to 1), "noh-bathe" (p = 0.54, 0.5 to 2 − √2).
+        stability limit: "central-difference", "cd-lagrange", "tchamwa-wielgosz" (phi = 1.033, 1 to 2; compliant laws
+        only), "chung-lee" (beta = 28/27, 1 to 28/27), "hulbert-chung" (rho = 0.8, 0 to 1), "noh-bathe" (p = 0.54, 0.5 to 2 − √2).
         Presets, with a mass by preset_mass: "smooth", "conservative", "explicit".
     displacement, velocity: initial values, (n); zero by default. start_time: time at the start.
     correction: makes velocity and acceleration agree with contacts that have closed, without which forces spike:
@@ -62,7 +59,6 @@ class Simulation:
         "persistency-release", "contact-implicit", "contact-stabilized", "laursen-love", "nonsmooth-splitting",
         "work-balance", "zero-acceleration".
     linear_solver: "automatic", "cholesky", "lu" (unsymmetric matrices), "conjugate-gradients" (no factor), "by-body".
-    contact_solver: "active-set", "pivoting", "gauss-seidel", "projected-gradient".
     smallest_step: steps that fail are halved down to this size; without it they raise. local_error: with it, steps are
         also halved until the error of a displacement in a step is estimated below this length.
     overlap: negative gaps at the start are "refused", "adjusted" (zero from then on), or removed in this time.
@@ -85,7 +81,6 @@ class Simulation:
         start_time: float = 0.0,
         correction: str = "default",
         linear_solver: str = "automatic",
-        contact_solver: str = "active-set",
         smallest_step: float | None = None,
         local_error: float | None = None,
         overlap: str | float = "refused",
@@ -100,6 +95,10 @@ class Simulation:
         self._system, self._contacts = system, list(contacts)
         self._run = Run(self._system, self._contacts, self._options)
         self._dofs = np.asarray(dofs, dtype=int)
+
+    def __repr__(self) -> str:
+        """The scheme, the correctors and the work counts."""
+        return repr(self._run)
 
     def step(self) -> None:
         """Takes one step, without recording it. If it fails, the state is that before the step."""
@@ -126,11 +125,6 @@ class Simulation:
     def time(self) -> float:
         """Time of the state."""
         return self._run.time
-
-    @property
-    def step_size(self) -> float:
-        """Size of the next step."""
-        return self._run.step_size
 
     @property
     def displacement(self) -> Vector:
@@ -162,14 +156,6 @@ class Simulation:
     def reactions(self) -> Vector:
         """Forces of the supports on the fixed and driven dofs, in ascending order of these."""
         return self._run.vector("reactions")
-
-    def energy(self) -> dict[str, float | None]:
-        """Kinetic and potential energy of the state, and the works since the start if energy="balance"."""
-        return self._run.energy()
-
-    def statistics(self) -> dict[str, int]:
-        """Numbers of steps, solves, factorizations, contact changes and refused steps."""
-        return self._run.statistics()
 
     def checkpoint(self) -> bytes:
         """State and history, to be pickled or written to a file; an equally built simulation goes on bit for bit."""
