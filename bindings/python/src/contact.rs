@@ -21,16 +21,17 @@ pub(crate) fn build(contact: &Object<'_>) -> Result<Constraints> {
     if name == "LinearRows" {
         return Ok(vec![Box::new(linear_rows(contact.getattr("rows")?.extract()?)?)]);
     }
-    if !["NodesOnObstacle", "BodyContact", "Tie"].contains(&&*name) {
-        let text = "expected LinearRows, NodesOnObstacle, BodyContact or Tie";
+    let is_on_obstacle = name == "NodesOnObstacle";
+    if !is_on_obstacle && name != "BodyContact" {
+        let text = "expected LinearRows, NodesOnObstacle or BodyContact";
         return Err(refused(format!("a contact is of the type {name}, {text}")).into());
     }
     let dimension = shape(&contact.getattr("coordinates")?)?.get(1).copied();
-    match (&*name, dimension) {
-        ("NodesOnObstacle", Some(2)) => nodes_on_obstacle::<2>(contact.extract()?),
-        ("NodesOnObstacle", Some(3)) => nodes_on_obstacle::<3>(contact.extract()?),
-        (_, Some(2)) => between_surfaces::<2>(&name, contact.extract()?),
-        (_, Some(3)) => between_surfaces::<3>(&name, contact.extract()?),
+    match (is_on_obstacle, dimension) {
+        (true, Some(2)) => nodes_on_obstacle::<2>(contact.extract()?),
+        (true, Some(3)) => nodes_on_obstacle::<3>(contact.extract()?),
+        (false, Some(2)) => between_bodies::<2>(contact.extract()?),
+        (false, Some(3)) => between_bodies::<3>(contact.extract()?),
         _ => Err(refused(format!("{name}: coordinates have the dimension {dimension:?}, expected 2 or 3")).into()),
     }
 }
@@ -125,9 +126,8 @@ impl<const D: usize> contact::Obstacle<f64, D> for SignedDistance {
     }
 }
 
-/// `BodyContact` and `Tie`, which has no law and no friction.
 #[derive(FromPyObject)]
-struct Surfaces<'py> {
+struct BodyContact<'py> {
     coordinates: Object<'py>,
     slave: Object<'py>,
     master: Option<Object<'py>>,
@@ -137,13 +137,9 @@ struct Surfaces<'py> {
     reach: Option<f64>,
 }
 
-fn between_surfaces<const D: usize>(name: &str, given: Surfaces<'_>) -> Result<Constraints> {
+fn between_bodies<const D: usize>(given: BodyContact<'_>) -> Result<Constraints> {
     let (coordinates, dofs) = mesh::<D>(&given.coordinates, given.dofs.as_ref())?;
     let (slave, master) = (facets(&given.slave)?, given.master.as_ref().map(facets).transpose()?);
-    if name == "Tie" {
-        let tie = contact::Tie::new(&coordinates, &dofs, slave, master.unwrap_or_default())?;
-        return Ok(vec![Box::new(if let Some(reach) = given.reach { tie.reach(reach)? } else { tie })]);
-    }
     let settings = SurfaceSettings::new().law(named::law(&given.law)?).friction(given.friction);
     let contact = match master {
         Some(master) => contact::BodyContact::new(&coordinates, &dofs, slave, master)?,

@@ -42,30 +42,26 @@ impl From<PyErr> for Fault {
 
 impl From<Fault> for PyErr {
     fn from(fault: Fault) -> Self {
-        match fault {
-            Fault::Python(error) => error,
+        let error = match fault {
+            Fault::Python(error) => return error,
             // What a callback has raised is raised again, with its traceback.
-            Fault::Crate(Error::Host { callback, source }) => match source.downcast::<PyErr>() {
-                Ok(error) => *error,
-                Err(source) => exception(&Error::Host { callback, source }),
+            Fault::Crate(Error::Host { callback, source }) => match source.downcast::<Self>() {
+                Ok(error) => return *error,
+                Err(source) => Error::Host { callback, source },
             },
-            Fault::Crate(error) => exception(&error),
+            Fault::Crate(error) => error,
+        };
+        match error {
+            Error::Dimension { .. }
+            | Error::Parameter { .. }
+            | Error::NotFinite { .. }
+            | Error::MatrixNotFinite { .. }
+            | Error::MissingDof { .. }
+            | Error::RepeatedDof { .. }
+            | Error::Empty { .. } => refused(error.to_string()),
+            Error::OutOfMemory { .. } => PyMemoryError::new_err(error.to_string()),
+            _ => ContactDynamicsError::new_err(error.to_string()),
         }
-    }
-}
-
-fn exception(error: &Error) -> PyErr {
-    let text = error.to_string();
-    match error {
-        Error::Dimension { .. }
-        | Error::Parameter { .. }
-        | Error::NotFinite { .. }
-        | Error::MatrixNotFinite { .. }
-        | Error::MissingDof { .. }
-        | Error::RepeatedDof { .. }
-        | Error::Empty { .. } => PyValueError::new_err(text),
-        Error::OutOfMemory { .. } => PyMemoryError::new_err(text),
-        _ => ContactDynamicsError::new_err(text),
     }
 }
 

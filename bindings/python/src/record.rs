@@ -1,10 +1,10 @@
 //! What is kept of the steps of a run, and when a run pauses.
 
 use contact_dynamics::observer::{ContactRecorder, EnergyRecorder, Wants};
-use contact_dynamics::{Control, Observer, Result, Simulation, StepView, Works};
+use contact_dynamics::{Control, Energy, Observer, Result, Simulation, StepView, Works};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use std::time::Instant;
 
 /// Contact forces, energies, and the motion of some dofs, at the start and after every step.
@@ -19,8 +19,13 @@ pub(crate) struct Recorder {
 
 impl Recorder {
     pub(crate) fn new(dofs: Vec<usize>, has_energy: bool) -> Self {
-        let (contact, energy, motion) = (ContactRecorder::new(), EnergyRecorder::new(), Default::default());
-        Self { dofs, has_energy, contact, energy, motion }
+        Self {
+            dofs,
+            has_energy,
+            contact: ContactRecorder::new(),
+            energy: EnergyRecorder::new(),
+            motion: <_>::default(),
+        }
     }
 
     /// Keeps the state from which a run starts, once.
@@ -46,38 +51,31 @@ impl Recorder {
 
     /// The columns as arrays.
     pub(crate) fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let columns = PyDict::new(py);
-        let set = |name: &str, values: Vec<f64>| columns.set_item(name, values.into_pyarray(py));
-        set("times", self.contact.times().to_vec())?;
-        set("contact_force", self.contact.forces().to_vec())?;
-        set("contact_impulse", self.contact.impulses().to_vec())?;
-        set("friction_force", self.contact.friction().to_vec())?;
-        let energies = self.energy.energies();
-        set("kinetic", energies.iter().map(|energy| energy.kinetic).collect())?;
-        set("potential", energies.iter().map(|energy| energy.potential.unwrap_or(0.0)).collect())?;
-        for (number, (name, _)) in works_by_name(&Works::default()).into_iter().enumerate() {
-            let work = |works| works_by_name(&works)[number].1;
-            set(&format!("work_{name}"), energies.iter().filter_map(|energy| energy.works).map(work).collect())?;
-        }
-        for (name, kept) in ["displacement", "velocity", "acceleration"].into_iter().zip(&self.motion) {
-            set(name, kept.clone())?;
-        }
-        Ok(columns)
+        let (contact, energies, [u, v, a]) = (&self.contact, self.energy.energies(), &self.motion);
+        let energy = |of: fn(&Energy<f64>) -> f64| energies.iter().map(of).collect::<Vec<_>>();
+        let work =
+            |of: fn(&Works<f64>) -> f64| energies.iter().filter_map(|energy| energy.works.as_ref().map(of)).collect();
+        let columns = [
+            ("times", contact.times().to_vec()),
+            ("contact_force", contact.forces().to_vec()),
+            ("contact_impulse", contact.impulses().to_vec()),
+            ("friction_force", contact.friction().to_vec()),
+            ("kinetic", energy(|energy| energy.kinetic)),
+            ("potential", energy(|energy| energy.potential.unwrap_or(0.0))),
+            ("work_load", work(|works| works.load)),
+            ("work_supports", work(|works| works.supports)),
+            ("work_damping", work(|works| works.damping)),
+            ("work_contact", work(|works| works.contact)),
+            ("work_friction", work(|works| works.friction)),
+            ("work_impacts", work(|works| works.impacts)),
+            ("work_corrections", work(|works| works.corrections)),
+            ("work_remainder", work(|works| works.remainder)),
+            ("displacement", u.clone()),
+            ("velocity", v.clone()),
+            ("acceleration", a.clone()),
+        ];
+        columns.map(|(name, values)| (name, values.into_pyarray(py))).into_py_dict(py)
     }
-}
-
-/// The lines of the energy balance.
-pub(crate) fn works_by_name(works: &Works<f64>) -> [(&'static str, f64); 8] {
-    [
-        ("load", works.load),
-        ("supports", works.supports),
-        ("damping", works.damping),
-        ("contact", works.contact),
-        ("friction", works.friction),
-        ("impacts", works.impacts),
-        ("corrections", works.corrections),
-        ("remainder", works.remainder),
-    ]
 }
 
 /// Keeps the steps, and stops a run when it is time to look at signals and progress.

@@ -23,24 +23,28 @@ struct Common<'py> {
     driven: BTreeMap<usize, Py<PyAny>>,
 }
 
+#[derive(FromPyObject)]
+#[expect(non_snake_case, reason = "the name of the literature")]
+struct Damping<'py> {
+    C: Option<Object<'py>>,
+    rayleigh: Option<(f64, f64)>,
+}
+
 /// A system of its own for a simulation.
 pub(crate) fn build(system: &Object<'_>) -> Result<Box<dyn System<f64>>> {
     match &*system.get_type().name()?.to_string() {
         "LinearSystem" => {
-            let mut linear = with_stiffness(system.extract()?, matrix(&system.getattr("K")?, "the stiffness matrix")?)?;
-            let (damping, rayleigh) = (system.getattr("C")?, system.getattr("rayleigh")?);
-            linear = match (damping.is_none(), rayleigh.is_none()) {
-                (true, true) => linear,
-                (false, true) => linear.damping(matrix(&damping, "the damping matrix")?)?,
-                (true, false) => {
-                    let (mass, stiffness) = rayleigh.extract()?;
-                    linear.rayleigh(mass, stiffness)?
+            let linear = with_stiffness(system.extract()?, matrix(&system.getattr("K")?, "the stiffness matrix")?)?;
+            Ok(Box::new(match system.extract()? {
+                Damping { C: None, rayleigh: None } => linear,
+                Damping { C: Some(damping), rayleigh: None } => {
+                    linear.damping(matrix(&damping, "the damping matrix")?)?
                 }
-                (false, false) => {
+                Damping { C: None, rayleigh: Some((mass, stiffness)) } => linear.rayleigh(mass, stiffness)?,
+                Damping { .. } => {
                     return Err(refused("C and rayleigh are both given; the damping is one of them").into());
                 }
-            };
-            Ok(Box::new(linear))
+            }))
         }
         "NonlinearSystem" => {
             let [force, tangent] = [system.getattr("internal_force")?, system.getattr("tangent")?];

@@ -28,6 +28,14 @@ def test_disc_of_scikit_fem_slides_on_a_plane(tmp_path, monkeypatch):
     assert pressed > 0
 
 
+def test_programs_of_the_page_run(tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    programs = (EXAMPLES.parents[2] / "docs/python.md").read_text().split("```python\n")[1:]
+    exec("".join(program.split("```")[0] for program in programs), {})
+    assert len(programs) == 2 and (tmp_path / "force.png").exists()
+
+
 def test_notebook_runs_and_asserts():
     notebook = nbformat.read(EXAMPLES / "two_bars.ipynb", as_version=4)
     assert len(notebook.cells) <= 10

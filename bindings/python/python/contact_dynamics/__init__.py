@@ -16,12 +16,11 @@ refuses raises ContactDynamicsError.
 """
 
 from ._core import ContactDynamicsError, Inadmissible, outer_facets, preset_mass
-from .contacts import BodyContact, Cuboid, LinearRows, NodesOnObstacle, Plane, SignedDistance, Sphere, Tie
-from .plotting import plot
-from .result import Result
+from .contacts import BodyContact, Cuboid, LinearRows, NodesOnObstacle, Plane, SignedDistance, Sphere
+from .result import Result, plot
 from .simulation import Contact, Simulation
 from .systems import LinearSystem, NonlinearSystem
 
 __all__ = ["BodyContact", "Contact", "ContactDynamicsError", "Cuboid", "Inadmissible", "LinearRows", "LinearSystem"]
-__all__ += ["NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere", "Tie"]
+__all__ += ["NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere"]
 __all__ += ["outer_facets", "plot", "preset_mass"]

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 from .contacts import Facets
 from .systems import Matrix, Vector
 
+__all__ = ["ContactDynamicsError", "Inadmissible", "Run", "outer_facets", "preset_mass"]
+
 class ContactDynamicsError(Exception): ...
 class Inadmissible(Exception): ...
 

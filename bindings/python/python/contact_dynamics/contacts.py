@@ -13,7 +13,7 @@ A contact law is a name, or a dictionary with the name and parameters in the uni
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -106,23 +106,6 @@ class BodyContact:
     friction: float = 0.0
     law: Named = "rigid"
     reach: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Tie:
-    """Two surfaces that stay together where they touch at u = 0; their nodes need not match.
-
-    Arguments as for BodyContact. reach: largest distance of facets that are tied; a tenth of their size by default.
-    """
-
-    coordinates: ArrayLike
-    slave: Facets
-    master: Facets
-    _: KW_ONLY
-    dofs: ArrayLike | None = None
-    reach: float | None = None
-    friction: float = field(default=0.0, init=False)
-    law: Named = field(default="rigid", init=False)
 
 
 class LinearRows:

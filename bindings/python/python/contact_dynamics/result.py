@@ -1,4 +1,4 @@
-"""Result: what a run has recorded."""
+"""Result: what a run has recorded, as arrays, as a table and as a figure."""
 
 from __future__ import annotations
 
@@ -8,53 +8,40 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .systems import Vector
+
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result:
-    """Histories of a run: m samples, the first at its start and then one after each step, as arrays of shape (m).
+    """Histories of a run: m samples, the first at its start and then one after each step, in arrays of shape (m).
 
-    The arrays of energies are empty if the simulation has energy="none", and `works` is without energy="balance".
+    contact_force: sum of the normal forces of all contacts, compression positive. contact_impulse: sum of their
+        impulses in the step (force · time). friction_force: sum of the magnitudes of all friction forces.
+    kinetic: ½ vᵀ M v. potential: elastic energy, ½ uᵀ K u of a linear system, zero if the system has none; weight is a
+        load. Both are empty if energy="none".
+    works: if energy="balance", works since the start by line of the balance: "load", "supports", "damping", "contact",
+        "friction", "impacts", "corrections", "remainder" (docs/energies.md). Their sum is the change of the energy.
+    dofs: the k recorded dofs, with displacement, velocity and acceleration of shape (m, k).
     """
 
-    times: Array
-    contact_force: Array
-    """Sum of the normal forces of all contacts (force ≥ 0; equality rows count with their sign)."""
-    contact_impulse: Array
-    """Sum of their impulses in the step (force · time)."""
-    friction_force: Array
-    """Sum of the magnitudes of all friction forces."""
-    kinetic: Array
-    """½ vᵀ M v."""
-    potential: Array
-    """Elastic energy, ½ uᵀ K u of a linear system; zero if the system has none. Weight is a load, not part of it."""
-    works: dict[str, Array]
-    """Works since the start, by line of the energy balance: "load", "supports", "damping", "contact", "friction",
-    "impacts", "corrections" and "remainder" (docs/energies.md). Their sum is the change of the total energy."""
+    times: Vector
+    contact_force: Vector
+    contact_impulse: Vector
+    friction_force: Vector
+    kinetic: Vector
+    potential: Vector
+    works: dict[str, Vector]
     dofs: NDArray[np.int_]
-    """The recorded dofs, k of them."""
-    displacement: Array
-    """(m, k)"""
-    velocity: Array
-    """(m, k)"""
-    acceleration: Array
-    """(m, k)"""
-
-    @classmethod
-    def of(cls, columns: dict[str, Array], dofs: NDArray[np.int_]) -> Result:
-        """From the columns of the compiled part."""
-        works = {name[5:]: columns.pop(name) for name in list(columns) if name.startswith("work_")}
-        works = {name: work for name, work in works.items() if work.size}
-        for name in ("displacement", "velocity", "acceleration"):
-            columns[name] = columns[name].reshape(columns["times"].size, dofs.size)
-        return cls(**columns, works=works, dofs=dofs)
+    displacement: Vector
+    velocity: Vector
+    acceleration: Vector
 
     @property
-    def total(self) -> Array:
+    def total(self) -> Vector:
         """Kinetic and potential energy together."""
         return self.kinetic + self.potential
 
@@ -62,11 +49,30 @@ class Result:
         """A table with a row for each sample, its time as the index; columns as here, and u_7, v_7, a_7 for dof 7."""
         import pandas
 
-        columns = {"contact_force": self.contact_force, "contact_impulse": self.contact_impulse}
-        columns["friction_force"] = self.friction_force
-        if self.kinetic.size:
-            columns |= {"kinetic": self.kinetic, "potential": self.potential}
+        names = ("contact_force", "contact_impulse", "friction_force", "kinetic", "potential")
+        columns = {name: getattr(self, name) for name in names if getattr(self, name).size}
         columns |= {f"work_{name}": work for name, work in self.works.items()}
         for letter, field in (("u", self.displacement), ("v", self.velocity), ("a", self.acceleration)):
             columns |= {f"{letter}_{dof}": field[:, place] for place, dof in enumerate(self.dofs)}
         return pandas.DataFrame(columns, index=pandas.Index(self.times, name="time"))
+
+
+def plot(result: Result) -> Figure:
+    """Draws the contact force, and below it the energies, over time; returns the figure of matplotlib."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1 + (result.kinetic.size > 0), sharex=True, squeeze=False, layout="constrained")
+    curves = [{"normal force": result.contact_force}, {}]
+    if result.friction_force.any():
+        curves[0]["friction"] = result.friction_force
+    if result.kinetic.size:
+        curves[1] = {"kinetic": result.kinetic, "potential": result.potential, "total": result.total}
+        seen = {name: work for name, work in result.works.items() if abs(work).max() > 1e-3 * result.total.max()}
+        curves[1] |= {f"work: {name}": work for name, work in seen.items()}
+    for axis, label, named in zip(axes[:, 0], ("contact force", "energy"), curves):
+        for name, values in named.items():
+            axis.plot(result.times, values, "--" if name.startswith("work") else "-", label=name)
+        axis.set_ylabel(label)
+        axis.legend()
+    axes[-1, 0].set_xlabel("time")
+    return figure

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -9,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._core import Run
-from .contacts import BodyContact, LinearRows, Named, NodesOnObstacle, Tie
-from .progress import Progress
+from .contacts import BodyContact, LinearRows, Named, NodesOnObstacle
 from .result import Result
 from .systems import LinearSystem, NonlinearSystem, Vector
 
-# Seconds between two looks at Ctrl-C and progress.
-PAUSE = 0.1
+# Seconds between two looks at Ctrl-C and progress, and before the progress is shown.
+PAUSE, DELAY = 0.1, 0.5
 
 
 class Contact(NamedTuple):
@@ -73,7 +74,7 @@ class Simulation:
         self,
         system: LinearSystem | NonlinearSystem,
         step: float,
-        contacts: Iterable[LinearRows | NodesOnObstacle | BodyContact | Tie] = (),
+        contacts: Iterable[LinearRows | NodesOnObstacle | BodyContact] = (),
         *,
         scheme: Named = "generalized-alpha",
         displacement: ArrayLike | None = None,
@@ -111,15 +112,29 @@ class Simulation:
         runs longer than half a second. Ctrl-C raises KeyboardInterrupt between two steps, an exception in one of your
         functions undoes its step; the simulation can go on from there, and `result` has the steps so far.
         """
-        with Progress(self.time, until, progress) as bar:
+        # Where nobody looks, nothing is shown.
+        progress &= "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+        start, begin, line = self.time, time.monotonic(), ""
+        try:
             while not self._run.advance(until, PAUSE, record):
-                bar.update(self.time)
+                if progress and time.monotonic() > begin + DELAY:
+                    share = (self.time - start) / (until - start)
+                    line = f"\r{'█' * int(40 * share):░<40} {share:4.0%}, t = {self.time:.4g} of {until:.4g} "
+                    print(line, end="", file=sys.stderr, flush=True)
+        finally:
+            if line:
+                print(file=sys.stderr)
         return self.result
 
     @property
     def result(self) -> Result:
         """What run has recorded since the start."""
-        return Result.of(self._run.record(), self._dofs)
+        columns = self._run.record()
+        works = {name[5:]: columns.pop(name) for name in list(columns) if name.startswith("work_")}
+        works = {name: work for name, work in works.items() if work.size}
+        for name in ("displacement", "velocity", "acceleration"):
+            columns[name] = columns[name].reshape(columns["times"].size, self._dofs.size)
+        return Result(**columns, works=works, dofs=self._dofs)
 
     @property
     def time(self) -> float:
