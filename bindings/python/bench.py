@@ -42,7 +42,8 @@ def measure(name, run, steps, samples):
         times["step"].append((time.perf_counter() - middle) / steps * 1e6)
     rust, python = (statistics.median(times[way]) for way in ("run", "step"))
     overhead, target = python - rust, 1.0 + 0.05 * rust
-    print(f"{name:<34} {rust:9.2f} {python:9.2f} {overhead:9.2f} {target:9.2f}  {'met' if overhead <= target else 'MISSED'}")
+    verdict = "met" if overhead <= target else "MISSED"
+    print(f"{name:<34} {rust:9.2f} {python:9.2f} {overhead:9.2f} {target:9.2f}  {verdict}")
 
 
 def main():

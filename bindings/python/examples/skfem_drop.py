@@ -30,17 +30,17 @@ def main(folder: Path, refine: int = 4, files: int = 20):
         weight[dofs[:, axis]] = GRAVITY[axis] * mass[dofs[:, axis]]
         velocity[dofs[:, axis]] = VELOCITY[axis]
 
-    contact = cd.NodesOnObstacle(cd.Plane([0, 0], [0, 1]), mesh.p.T, mesh.boundary_nodes(), dofs=dofs, friction=FRICTION)
+    floor = cd.Plane([0, 0], [0, 1])
+    contact = cd.NodesOnObstacle(floor, mesh.p.T, mesh.boundary_nodes(), dofs=dofs, friction=FRICTION)
     disc = cd.LinearSystem(mass, stiffness, rayleigh=(0.0, 1e-6), load=weight)
     run = cd.Simulation(disc, 1e-5, [contact], velocity=velocity, energy="balance")
 
     folder.mkdir(parents=True, exist_ok=True)
-    in_space = lambda field: np.pad(field[dofs], ((0, 0), (0, 1)))  # noqa: E731
+    points = np.pad(mesh.p.T, ((0, 0), (0, 1)))
     for number in range(files + 1):
         result = run.run(number * 0.015 / files)
         fields = {"displacement": run.displacement, "velocity": run.velocity, "contact force": run.contact_forces()}
-        data = {name: in_space(field) for name, field in fields.items()}
-        points = np.pad(mesh.p.T, ((0, 0), (0, 1)))
+        data = {name: np.pad(field[dofs], ((0, 0), (0, 1))) for name, field in fields.items()}
         meshio.Mesh(points, [("triangle", mesh.t.T)], data).write(folder / f"disc_{number:03}.vtu")
     momentum = np.array([(mass * (run.velocity - velocity))[dofs[:, axis]].sum() for axis in range(2)])
     momentum -= np.array([weight[dofs[:, axis]].sum() for axis in range(2)]) * run.time

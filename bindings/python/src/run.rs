@@ -79,6 +79,8 @@ impl Run {
             let control = StepControl::halving(smallest)?;
             let error = options.local_error.map(|error| control.local_error(error));
             builder = builder.step_control(error.unwrap_or(Ok(control))?);
+        } else if options.local_error.is_some() {
+            return Err(refused("local_error is given without smallest_step, to which steps may be halved").into());
         }
         if options.start_at_rest {
             builder = builder.start_at_rest();

@@ -20,7 +20,8 @@ N = 20
 def scene(step=1e-3, load=None, law="rigid", **options):
     mass, stiffness = bar(N)
     wall = cd.LinearRows().unilateral({N: -1.0}, 0.005, law=law)
-    return cd.Simulation(cd.LinearSystem(mass, stiffness, load=load), step, [wall], velocity=np.full(N + 1, 0.05), **options)
+    system = cd.LinearSystem(mass, stiffness, load=load)
+    return cd.Simulation(system, step, [wall], velocity=np.full(N + 1, 0.05), **options)
 
 
 def test_every_scheme_and_correction_runs_by_its_name():
@@ -31,8 +32,9 @@ def test_every_scheme_and_correction_runs_by_its_name():
     for name in names:
         law = {"name": "penalty", "stiffness": 50.0} if name == "tchamwa-wielgosz" else "rigid"
         assert scene(5e-4, scheme=name, law=law).run(0.12, progress=False).contact_force.max() > 0.5 * FORCE
-    for name in ("none", "persistency", "persistency-history", "persistency-release", "contact-implicit",
-                 "contact-stabilized", "nonsmooth-splitting", "zero-acceleration"):  # fmt: skip
+    for name in ("none", "persistency", "persistency-history", "persistency-release", "contact-implicit"):
+        scene(correction=name).run(0.12, progress=False)
+    for name in ("contact-stabilized", "nonsmooth-splitting", "zero-acceleration"):
         scene(correction=name).run(0.12, progress=False)
 
 
@@ -41,7 +43,8 @@ def test_matrices_of_any_layout_give_the_same_run():
     wide = sp.csr_matrix(stiffness)
     wide.indices, wide.indptr = wide.indices.astype(np.int64), wide.indptr.astype(np.int64)
     consistent = [sp.diags(mass), sp.diags(mass).tocsc(), np.diag(mass)]
-    forms = [(mass, k) for k in (stiffness.tocsc(), stiffness.tocoo(), stiffness.toarray(), wide, sp.csr_array(stiffness))]
+    layouts = (stiffness.tocsc(), stiffness.tocoo(), stiffness.toarray(), wide, sp.csr_array(stiffness))
+    forms = [(mass, k) for k in layouts]
     wall = cd.LinearRows().unilateral({N: -1.0}, 0.005)
     expected = scene().run(0.2, progress=False).contact_force
     for m, k in forms + [(m, stiffness) for m in consistent]:
@@ -78,6 +81,7 @@ REFUSED = {
     "velocity": (lambda: build(velocity=[1.0]), ValueError, r"the velocity: the shape is \[1\], expected \[21\]"),
     "matrix": (lambda: build(velocity=[[1.0]]), ValueError, r"shape is \[1, 1\], expected \[21\]"),
     "step": (lambda: scene(step=-1.0), ValueError, "the step size h is -1e0"),
+    "local error": (lambda: scene(local_error=1e-3), ValueError, "without smallest_step"),
     "stability": (lambda: scene(1.0, scheme="central-difference"), cd.ContactDynamicsError, "stability limit"),
     "radius": (lambda: scene(scheme={"name": "bathe", "rho": 2}), ValueError, r"it must be in \[0, 1\]"),
     "parameter": (lambda: scene(scheme={"name": "bathe", "gamma": 2}), ValueError, "has no parameter gamma"),
@@ -121,9 +125,10 @@ def test_exceptions_of_functions_are_raised_and_undo_the_step():
     with pytest.raises(KeyError, match="late"):
         run.run(0.4, progress=False)
     assert 0.045 < run.time < 0.051 and run.result.times[-1] == run.time
-    for load, text in ((lambda t: np.zeros(3), "the load returned 3 numbers, expected 21"), (lambda t: "?", "could not convert")):
-        with pytest.raises(ValueError, match=text):
-            scene(load=load)
+    with pytest.raises(ValueError, match="the load returned 3 numbers, expected 21"):
+        scene(load=lambda t: np.zeros(3))
+    with pytest.raises(ValueError, match="could not convert"):
+        scene(load=lambda t: "?")
     with pytest.raises(cd.ContactDynamicsError, match="acceleration of dof 0 is NaN"):
         scene(load=lambda t: np.full(N + 1, np.nan))
 
@@ -168,7 +173,8 @@ def test_inadmissible_states_halve_the_step():
     run = cd.Simulation(cd.NonlinearSystem(np.array([1.0]), force, tangent), 0.05, velocity=[50.0])
     with pytest.raises(cd.ContactDynamicsError, match="too far"):
         run.run(0.6, progress=False)
-    wrong = cd.NonlinearSystem(np.array([1.0, 1.0]), force, lambda u: sp.eye(2) if not u.any() else sp.csr_matrix(np.ones((2, 2))))
+    full = sp.csr_matrix(np.ones((2, 2)))
+    wrong = cd.NonlinearSystem(np.ones(2), force, lambda u: full if u.any() else sp.eye(2))
     with pytest.raises(ValueError, match=r"entry \(1, 0\) of the tangent is not among those"):
         cd.Simulation(wrong, 0.05, velocity=[1.0, 0.0]).step()
 

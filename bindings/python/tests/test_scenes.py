@@ -59,9 +59,11 @@ def test_nonlinear_oscillator_is_that_of_scipy():
     )
     run = cd.Simulation(system, 1e-3, displacement=[1.0], dofs=[0], scheme="energy-momentum")
     result = run.run(5.0, progress=False)
-    other = solve_ivp(
-        lambda _, y: [y[1], -(2 * y[0] ** 3 + y[0]) / 2], (0, 5), [1.0, 0.0], t_eval=result.times, rtol=1e-10, atol=1e-12
-    )
+
+    def rate(_, state):
+        return [state[1], -(2 * state[0] ** 3 + state[0]) / 2]
+
+    other = solve_ivp(rate, (0, 5), [1.0, 0.0], t_eval=result.times, rtol=1e-10, atol=1e-12)
     assert abs(result.displacement[:, 0] - other.y[0]).max() < 1e-5
     assert abs(result.total / result.total[0] - 1).max() < 1e-9
 

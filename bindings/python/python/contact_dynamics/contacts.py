@@ -127,7 +127,7 @@ class LinearRows:
         friction: float = 0.0,
         tangents: Sequence[Entries] = (),
     ) -> LinearRows:
-        """gap ≥ 0; the force, positive, opens it. Friction (≥ 0) acts along tangents: one in the plane, two in space."""
+        """gap ≥ 0; the force is ≥ 0. Friction (≥ 0) acts along tangents: one in the plane, two in space."""
         self.rows.append((dict(entries), gap, law, None, friction, [dict(tangent) for tangent in tangents]))
         return self
 

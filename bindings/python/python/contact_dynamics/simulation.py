@@ -52,7 +52,8 @@ class Simulation:
         1), "houbolt", "park", "bdf2", "oalts" (rho = 0.5, 0 to 1), "gssss" (0 ≤ rho_3 ≤ rho_1 ≤ rho_2 ≤ 1, all 0.8),
         "moreau-jean" (theta = 0.5, 0.5 to 1), "energy-momentum"; explicit, for lumped masses and steps below the
         stability limit: "central-difference", "cd-lagrange", "tchamwa-wielgosz" (phi = 1.033, 1 to 2; compliant laws
-        only), "chung-lee" (beta = 28/27, 1 to 28/27), "hulbert-chung" (rho = 0.8, 0 to 1), "noh-bathe" (p = 0.54, 0.5 to 2 − √2).
+        only), "chung-lee" (beta = 28/27, 1 to 28/27), "hulbert-chung" (rho = 0.8, 0 to 1), "noh-bathe" (p = 0.54,
+        0.5 to 2 − √2).
         Presets, with a mass by preset_mass: "smooth", "conservative", "explicit".
     displacement, velocity: initial values, (n); zero by default. start_time: time at the start.
     correction: makes velocity and acceleration agree with contacts that have closed, without which forces spike:
