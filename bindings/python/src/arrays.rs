@@ -5,6 +5,7 @@ use contact_dynamics::faer::sparse::SparseColMat;
 use contact_dynamics::matrix::{self, Stored};
 use numpy::{Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::IntoPyDict;
 
 /// Any length, in the shape that an array must have.
 pub(crate) const ANY: usize = usize::MAX;
@@ -25,7 +26,8 @@ fn numbers<T: Element + Copy>(
     if array.len() > 0 && !kinds.contains(&given.kind()) {
         return Err(refused(format!("{what}: the dtype is {given}, expected {dtype}")));
     }
-    let array = array.call_method1("astype", (dtype,))?.cast_into::<PyArrayDyn<T>>()?;
+    let in_place = [("copy", false)].into_py_dict(value.py())?;
+    let array = array.call_method("astype", (dtype,), Some(&in_place))?.cast_into::<PyArrayDyn<T>>()?;
     Ok(array.readonly().as_array().iter().copied().collect())
 }
 

@@ -2,7 +2,7 @@
 
 use crate::arrays::{ANY, floats, indices, rows, shape};
 use crate::callback::{fill, infallible};
-use crate::error::{Result, refused};
+use crate::error::{Result, refused, unexpected};
 use crate::named;
 use contact_dynamics::LinearRows as Rows;
 use contact_dynamics::contact::{
@@ -21,18 +21,16 @@ pub(crate) fn build(contact: &Object<'_>) -> Result<Constraints> {
     if name == "LinearRows" {
         return Ok(vec![Box::new(linear_rows(contact.getattr("rows")?.extract()?)?)]);
     }
-    let is_on_obstacle = name == "NodesOnObstacle";
-    if !is_on_obstacle && name != "BodyContact" {
-        let text = "expected LinearRows, NodesOnObstacle or BodyContact";
-        return Err(refused(format!("a contact is of the type {name}, {text}")).into());
-    }
-    let dimension = shape(&contact.getattr("coordinates")?)?.get(1).copied();
-    match (is_on_obstacle, dimension) {
-        (true, Some(2)) => nodes_on_obstacle::<2>(contact.extract()?),
-        (true, Some(3)) => nodes_on_obstacle::<3>(contact.extract()?),
-        (false, Some(2)) => between_bodies::<2>(contact.extract()?),
-        (false, Some(3)) => between_bodies::<3>(contact.extract()?),
-        _ => Err(refused(format!("{name}: coordinates have the dimension {dimension:?}, expected 2 or 3")).into()),
+    let Ok(coordinates) = contact.getattr("coordinates") else {
+        return Err(unexpected("a contact", contact, "LinearRows, NodesOnObstacle or BodyContact"));
+    };
+    let shape = shape(&coordinates)?;
+    match (&*name, &shape[..]) {
+        ("NodesOnObstacle", [_, 2]) => nodes_on_obstacle::<2>(contact.extract()?),
+        ("NodesOnObstacle", [_, 3]) => nodes_on_obstacle::<3>(contact.extract()?),
+        (_, [_, 2]) => between_bodies::<2>(contact.extract()?),
+        (_, [_, 3]) => between_bodies::<3>(contact.extract()?),
+        _ => Err(refused(format!("{name}: coordinates have the shape {shape:?}, expected [any, 2 or 3]")).into()),
     }
 }
 
@@ -93,10 +91,7 @@ fn obstacle<const D: usize>(body: &Object<'_>) -> Result<Box<dyn contact::Obstac
         }
         "Cuboid" => Ok(Box::new(Cuboid::new(place("center")?, place("half")?, number("rounding")?)?)),
         "SignedDistance" => Ok(Box::new(body.extract::<SignedDistance>()?)),
-        name => {
-            let text = "expected Plane, Sphere, Cuboid or SignedDistance";
-            Err(refused(format!("an obstacle is of the type {name}, {text}")).into())
-        }
+        _ => Err(unexpected("an obstacle", body, "Plane, Sphere, Cuboid or SignedDistance")),
     }
 }
 
@@ -219,12 +214,10 @@ fn linear_rows(rows: Vec<Row<'_>>) -> Result<Rows<'static, f64>> {
             (None, law) => built.row(named::law(law)?, &entries, offset),
         };
         let tangents: Vec<Vec<_>> = tangents.into_iter().map(Vec::from_iter).collect();
-        match (friction != 0.0, tangents.is_empty()) {
-            (true, true) => return Err(refused(format!("a row has the friction {friction} but no tangents")).into()),
-            (true, false) => {
-                built = built.friction(friction, &tangents.iter().map(Vec::as_slice).collect::<Vec<_>>());
-            }
-            (false, _) => {}
+        if friction != 0.0 && tangents.is_empty() {
+            return Err(refused(format!("a row has the friction {friction} but no tangents")).into());
+        } else if friction != 0.0 {
+            built = built.friction(friction, &tangents.iter().map(Vec::as_slice).collect::<Vec<_>>());
         }
     }
     Ok(built)

@@ -65,6 +65,12 @@ impl From<Fault> for PyErr {
     }
 }
 
+/// A `ValueError` for an object of a type that is not expected.
+pub(crate) fn unexpected(what: &str, object: &Bound<'_, PyAny>, expected: &str) -> Fault {
+    let name = object.get_type().name().map_or_else(|_| "?".into(), |name| name.to_string());
+    Fault::Python(refused(format!("{what} is of the type {name}, expected {expected}")))
+}
+
 /// A `ValueError`.
 pub(crate) fn refused(text: impl Into<String>) -> PyErr {
     PyValueError::new_err(text.into())

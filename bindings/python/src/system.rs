@@ -2,7 +2,7 @@
 
 use crate::arrays::{ANY, floats, indices, matrix, shape};
 use crate::callback::{fallible, fill, infallible};
-use crate::error::{Result, refused};
+use crate::error::{Result, refused, unexpected};
 use crate::named;
 use contact_dynamics::faer::sparse::{SparseColMat, SymbolicSparseColMatRef};
 use contact_dynamics::{LinearSystem, Mass, System, TangentWeights, mass};
@@ -54,10 +54,7 @@ pub(crate) fn build(system: &Object<'_>) -> Result<Box<dyn System<f64>>> {
             let potential = Some(system.getattr("potential")?).filter(|given| !given.is_none()).map(Bound::unbind);
             Ok(Box::new(Callbacks { linear, force: force.unbind(), tangent: tangent.unbind(), potential }))
         }
-        name => {
-            let text = "expected LinearSystem or NonlinearSystem";
-            Err(refused(format!("the system is of the type {name}, {text}")).into())
-        }
+        _ => Err(unexpected("the system", system, "LinearSystem or NonlinearSystem")),
     }
 }
 
