@@ -164,3 +164,51 @@ def test_presets_bring_mass_and_correction():
         assert result.total[-1] / result.total[0] == pytest.approx(1.0, abs=0.01)
         forces[name] = np.interp(0.2, result.times, result.contact_force)
     assert list(forces.values()) == pytest.approx([FORCE] * 3, rel=0.05)
+
+
+def test_rows_hold_and_bonds_break():
+    pulled = cd.LinearSystem([1.0, 1.0], FREE, load=lambda t: [10 * t, 0.0])
+    tied = cd.Simulation(pulled, 0.01, [cd.LinearRows().equality({0: 1.0, 1: -1.0}, 0.0)])
+    tied.run(1.0, progress=False)
+    assert tied.displacement[0] == pytest.approx(tied.displacement[1], abs=1e-12)
+    glued = cd.Simulation(pulled, 0.01, [cd.LinearRows().bond(4.999, {0: 1.0}, 0.0)])
+    glued.run(1.0, progress=False)
+    assert glued.velocity[0] == pytest.approx(5 * (1 - 0.5**2), abs=0.06)  # free from t = 0.5 s on, within a step
+
+
+@pytest.mark.parametrize("body", [cd.Cuboid([0, -0.5], [2, 0.5], 0.1), cd.Sphere([0, -1], 1.0)])
+def test_a_particle_comes_to_rest_on_a_body(body):
+    contact = cd.NodesOnObstacle(body, [[0.0, 0.01]], [0], reach=0.1)
+    run = cd.Simulation(cd.LinearSystem([2.0, 2.0], FREE, load=[0.0, -20.0]), 0.01, [contact])
+    assert run.run(0.3, progress=False).contact_force[-1] == pytest.approx(20.0)
+    assert run.displacement == pytest.approx([0.0, -0.01], abs=1e-12)
+
+
+def test_overlaps_and_linear_solvers():
+    with pytest.raises(cd.ContactDynamicsError, match="is violated at the start"):
+        cd.Simulation(cd.LinearSystem([1.0, 1.0], FREE), 0.01, [cd.LinearRows().unilateral({0: 1.0}, -1e-3)])
+    for overlap, expected in (("adjusted", 0.0), (0.5, 1e-3)):
+        row = cd.LinearRows().unilateral({0: 1.0}, -1e-3)
+        run = cd.Simulation(cd.LinearSystem([1.0], sp.eye(1) * 9.0), 0.01, [row], overlap=overlap)
+        run.run(1.0, progress=False)
+        assert run.displacement[0] == pytest.approx(expected, abs=1e-12)
+    forces = [
+        against_wall(linear_solver=name).run(0.2, progress=False).contact_force[-1]
+        for name in ("automatic", "cholesky", "lu", "conjugate-gradients", "by-body")
+    ]
+    assert forces == pytest.approx([forces[0]] * 5, rel=1e-6)
+
+
+def test_a_cube_lands_on_a_cube():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    coordinates = np.vstack([np.column_stack([square, np.full(4, z)]) for z in (0.0, 1.0, 1.1, 2.1)])
+    upper, lower = (cd.outer_facets(coordinates, [np.arange(8) + first]) for first in (8, 0))
+    assert upper[0].shape == (6, 4) and upper[0].min() == 8
+    system = cd.LinearSystem(np.ones(48), sp.csr_matrix((48, 48)), fixed=np.arange(24))
+    velocity = np.zeros(48)
+    velocity[26::3] = -1.0
+    run = cd.Simulation(system, 0.01, [cd.BodyContact(coordinates, upper, lower, friction=0.5)], velocity=velocity)
+    run.run(0.2, progress=False)
+    landed = run.displacement.reshape(4, 4, 3)[2]
+    assert landed == pytest.approx(np.tile([0.0, 0.0, -0.1], (4, 1)), abs=1e-9)
+    assert {contact.status for contact in run.contacts()} & {"touching", "closed", "sticking"}
