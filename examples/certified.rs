@@ -16,7 +16,7 @@ struct Line {
     scenes: u64,
     touched: u64,
     steps: u64,
-    /// Attempts halved, and those of them without a certificate.
+    /// Halved attempts, and the number of them that had no certificate.
     halved: u64,
     rejected: usize,
     /// Runs that ended early: without a certificate, or for another reason.

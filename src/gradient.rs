@@ -68,8 +68,8 @@ impl<T: Real> Simulation<'_, T> {
     /// [`gradient`](Self::gradient) refuses what occurred in the run: forces under other [laws](crate::ContactLaw) than
     /// `Rigid`, `Equality`, `Penalty`, `PowerLaw`, `KelvinVoigt` and `HuntCrossley`, changes of the step size if the
     /// scheme reads more than u, v and a of the last state, restarts, damping that a step does not resolve, penetration
-    /// that comes out in several steps, and along rows that turn friction, damped laws, projections of the past, and
-    /// places where rows jump.
+    /// recovered over several steps, and along rows that turn friction, damped laws, projections of the past, and places
+    /// where rows jump.
     pub fn record(&mut self) -> Result<()> {
         self.check_sound()?;
         let past = support::check(self)?;

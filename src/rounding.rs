@@ -81,8 +81,8 @@ pub(crate) fn projected_residual<T: Float>() -> T {
     number::<T>(1e-12).max(number::<T>(8.0) * T::epsilon())
 }
 
-/// The same for the first problem of rows that turn, whose rows differ from those of the solution by more; and for a
-/// later one, over the largest difference between its rows and those of the solution before.
+/// The residual of the first contact problem of a stage with turning rows, relative to the contact forces; and of a later
+/// one, divided by the largest change of its rows since the last problem.
 pub(crate) const FIRST_RESIDUAL: f64 = 1e-4;
 pub(crate) const RESIDUAL_BY_MISS: f64 = 1e-3;
 
@@ -105,8 +105,8 @@ pub(crate) fn touching<T: Float>(way: T) -> T {
 
 // Gradients.
 
-/// How far differences of rows over two distances may be apart, relative to the derivative and to that of a row which
-/// turns by 1 over the length from which it is computed. They agree to √ε and better, except across a jump.
+/// The largest difference between derivatives of rows by differences over two distances: relative to the derivative, and
+/// to the derivative of a row that turns by 1 over the length of its facet. Across a jump of the row it is larger.
 pub(crate) const DIFFERENCES: f64 = 1e-4;
 
 // Geometry of surfaces.

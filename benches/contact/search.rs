@@ -1,4 +1,4 @@
-//! Searches between two plates of a hundred thousand facets, linearizations of what they find, and certificates of
+//! Two plates of a hundred thousand facets: searches, linearizations of the contacts found, and certificates of
 //! non-penetration, beside the step without contact.
 
 use super::MATERIAL;

@@ -140,7 +140,7 @@ impl NonPenetration {
         }
     }
 
-    /// What has been certified, to be read while a run goes on and after it.
+    /// The numbers of certified and rejected steps and the smallest distance, during a run and after it.
     pub fn certificate(&self) -> Certificate {
         self.certificate.clone()
     }
@@ -294,7 +294,7 @@ impl<T: Real> ContactConstraint<T> for NonPenetration {
     }
 }
 
-/// What a [`NonPenetration`] has certified so far.
+/// The results of a [`NonPenetration`] so far.
 #[derive(Clone, Debug, Default)]
 pub struct Certificate(Arc<Mutex<Certified>>);
 

@@ -75,9 +75,8 @@ impl<T: Real> Product<T> {
     /// [`measure`](Self::measure).
     pub(crate) fn write_packed(&mut self, distance: usize, x: &[T], y: &mut [T]) {
         if let Self::Supervariables(supervariables) = self {
-            supervariables.highest = u8::try_from(distance + 1).unwrap_or(FAR);
-            supervariables.multiply(T::one(), None, x, y, Accumulate::Replace);
-            supervariables.highest = FAR;
+            let highest = u8::try_from(distance + 1).unwrap_or(FAR);
+            supervariables.multiply((T::one(), None, highest), x, y, Accumulate::Replace);
         }
     }
 
@@ -126,7 +125,7 @@ impl<T: Real> Product<T> {
             Self::Tridiagonal { diagonal, beside } => {
                 T::tridiagonal_product(c, Tridiagonal { diagonal, beside }, x, y, put);
             }
-            Self::Supervariables(supervariables) => supervariables.multiply(c, Some(a), x, y, put),
+            Self::Supervariables(supervariables) => supervariables.multiply((c, Some(a), FAR), x, y, put),
         }
     }
 }
@@ -143,11 +142,9 @@ pub(crate) struct Supervariables<T> {
     packed: Vec<T>,
     /// The distance of each supervariable from some dofs; empty if it was not measured.
     levels: Vec<u8>,
-    /// Supervariables of higher levels are not multiplied.
-    highest: u8,
 }
 
-/// The level of what is too far to be counted.
+/// The level of supervariables too far to be counted.
 const FAR: u8 = u8::MAX;
 
 /// Columns that one thread multiplies.
@@ -210,7 +207,7 @@ impl<T: Real> Supervariables<T> {
         all.shrink_to_fit();
         groups.shrink_to_fit();
         let parts = Self::parts(pattern, &all)?;
-        Ok(Some(Self { all, groups, parts, packed: Vec::new(), levels: Vec::new(), highest: FAR }))
+        Ok(Some(Self { all, groups, parts, packed: Vec::new(), levels: Vec::new() }))
     }
 
     /// Parts with similar numbers of entries; a single one if they would contribute to many rows of each other.
@@ -311,8 +308,15 @@ impl<T: Real> Supervariables<T> {
         if whole > 0 { read as f64 / whole as f64 } else { 1.0 }
     }
 
-    fn multiply(&mut self, c: T, a: Option<SparseColMatRef<'_, usize, T>>, x: &[T], y: &mut [T], put: Accumulate) {
-        let Self { all, groups, parts, packed, levels, highest } = self;
+    /// `y = c A x` or `y += c A x` with the supervariables up to a level; A is packed if it is not given.
+    fn multiply(
+        &mut self,
+        (c, a, highest): (T, Option<SparseColMatRef<'_, usize, T>>, u8),
+        x: &[T],
+        y: &mut [T],
+        put: Accumulate,
+    ) {
+        let Self { all, groups, parts, packed, levels } = self;
         let entries = |part: &Part<T>| match a.filter(|_| packed.is_empty()) {
             Some(a) => LowerEntries::Matrix(a),
             None => LowerEntries::Packed(packed.get(part.packed..).unwrap_or(&[])),
@@ -321,7 +325,7 @@ impl<T: Real> Supervariables<T> {
             entries: entries(part),
             supervariables: &all[part.supervariables.start..=part.supervariables.end],
             groups,
-            levels: (levels.get(part.supervariables.clone()).unwrap_or(&[]), *highest),
+            levels: (levels.get(part.supervariables.clone()).unwrap_or(&[]), highest),
         };
         if let [part] = &parts[..] {
             if put == Accumulate::Replace {

@@ -59,8 +59,8 @@ fn nodes_slide_on_facets() {
     assert_equal(&fall(blocks, nodes_on_facets, 0.0212).unwrap(), "blocks");
 }
 
-/// Rates of mortar rows are differences, so that whole runs differ by 1e-6 from what is smooth. In space rows have jumps
-/// of quadrature.
+/// Rates of mortar rows are differences, so that results of whole runs are smooth to 1e-6 only. In space rows jump with
+/// their quadrature points.
 #[test]
 fn weighted_gaps() {
     assert_near(&fall(plates, mortar, 0.0107).unwrap(), 2e-5, "plates");

@@ -96,7 +96,7 @@ fn events_without_derivative_are_refused_by_the_gradient() {
     assert_refused(gradient(&mut run), "a restart");
 }
 
-/// A floor that is looked for from some time on: what has passed it by then is found inside, and comes out slowly.
+/// A floor that is not searched before some time: nodes below it are found inside then, and are recovered slowly.
 struct LateFloor(bool);
 
 impl ContactConstraint<f64> for LateFloor {

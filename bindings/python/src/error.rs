@@ -44,7 +44,7 @@ impl From<Fault> for PyErr {
     fn from(fault: Fault) -> Self {
         let error = match fault {
             Fault::Python(error) => return error,
-            // What a callback has raised is raised again, with its traceback.
+            // The exception of a callback is raised again, with its traceback.
             Fault::Crate(Error::Host { callback, source }) => match source.downcast::<Self>() {
                 Ok(error) => return *error,
                 Err(source) => Error::Host { callback, source },

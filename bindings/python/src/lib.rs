@@ -1,6 +1,6 @@
 //! `contact_dynamics._core`: the crate for the Python package in the folder python/, whose classes describe the input.
 //!
-//! - `run`: a simulation, its state and its steps; `record`: what is kept of the steps.
+//! - `run`: a simulation, its state and its steps; `record`: the recorded columns.
 //! - `system`, `contact`: systems, constraints and obstacles from their descriptions in Python.
 //! - `named`: schemes, laws, corrections and solvers by name.
 //! - `arrays`: arrays of NumPy and sparse matrices of SciPy; `callback`: calls of Python functions.

@@ -84,7 +84,7 @@ pub(crate) fn preset(name: &str) -> Option<Preset> {
     }
 }
 
-/// A scheme, or that of a preset with its correctors.
+/// A scheme by its name, or the scheme and the correctors of a preset.
 pub(crate) fn scheme(value: &Bound<'_, PyAny>) -> Result<(Scheme, Option<Correctors>)> {
     match value.extract::<String>().ok().as_deref().and_then(preset) {
         Some(preset) => Ok((preset.integrator(), Some(preset.correctors()))),

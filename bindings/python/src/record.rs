@@ -1,4 +1,4 @@
-//! What is kept of the steps of a run, and when a run pauses.
+//! Recorded columns of a run, and the pauses of a run.
 
 use contact_dynamics::observer::{ContactRecorder, EnergyRecorder, Wants};
 use contact_dynamics::{Control, Energy, Observer, Result, Simulation, StepView, Works};

@@ -135,8 +135,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         }
         self.guess_multipliers();
         let Self { stage, clock, host, new, g, operator, contact, .. } = self;
-        let ContactWork { rows: work, interface, .. } = &mut **contact;
-        let ContactRowsWork { laws, weight, curved, problem, .. } = &mut *work;
+        let ContactWork { rows, interface, .. } = &mut **contact;
+        let ContactRowsWork { laws, weight, curved, problem, .. } = rows;
         let ProblemRows { rows, own, offset, sets, tolerance, multipliers, .. } = problem;
         own.clear();
         // A row with a known force has no weight, and with this no finite compliance.
