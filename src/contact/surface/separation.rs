@@ -4,15 +4,16 @@
 //! Keerthi (IEEE J. Robot. Autom. 4, 1988). In motion the corners of both facets move on straight lines, each at a
 //! constant velocity. Along a fixed normal the distance of two corners is then linear in time: a plane that separates
 //! all corners at both ends of an interval separates the hulls within the interval. Where a plane fails, the interval
-//! is halved. Planes are only proposed by floating-point arithmetic, and then checked.
+//! is halved; where it does not, the next interval is twice as long. Planes are only proposed by floating-point
+//! arithmetic, and then checked.
 
 use super::shape::{Point, add_scaled, cross, dot, sub};
 
 /// The corners of a facet, two to four.
 pub(crate) type Corners = ([Point; 4], usize);
 
-/// Halvings of a step: the motion in the shortest interval is a billionth of that in the step.
-const HALVINGS: u32 = 30;
+/// The number of planes that are tried for two facets in a step.
+const MOST_PLANES: usize = 1000;
 
 /// Iterations to the shortest vector; more are not needed even for nearly parallel facets.
 const MOST_ITERATIONS: usize = 32;
@@ -20,23 +21,27 @@ const MOST_ITERATIONS: usize = 32;
 /// A lower bound of the distance of two facets while their corners move from the first positions to the second; none
 /// if it is not shown to be more than `least` at all times.
 pub(crate) fn distance_in_motion(ends: &[[Corners; 2]; 2], least: f64) -> Option<f64> {
-    within(ends, [0.0, 1.0], least, HALVINGS)
-}
-
-fn within(ends: &[[Corners; 2]; 2], [from, to]: [f64; 2], least: f64, halvings: u32) -> Option<f64> {
-    let middle = from.midpoint(to);
-    let normal = between(&at(ends, middle))?;
-    let distance = [from, to].map(|share| along(normal, &at(ends, share)));
-    let smaller = distance[0].min(distance[1]);
-    if smaller > least {
-        return Some(smaller);
+    let (mut from, mut length, mut smallest) = (0.0, 1.0, f64::INFINITY);
+    for _ in 0..MOST_PLANES {
+        let to = f64::min(from + length, 1.0);
+        let middle = at(ends, from.midpoint(to));
+        let normal = between(&middle)?;
+        let [start, end] = [from, to].map(|share| along(normal, &at(ends, share)));
+        let distance = start.min(end);
+        if distance > least {
+            smallest = smallest.min(distance);
+            if to >= 1.0 {
+                return Some(smallest);
+            }
+            (from, length) = (to, 2.0 * length);
+        } else if along(normal, &middle) <= least {
+            // No other plane is better there.
+            return None;
+        } else {
+            length = 0.5 * (to - from);
+        }
     }
-    // At the middle no other plane would be better.
-    if halvings == 0 || along(normal, &at(ends, middle)) <= least {
-        return None;
-    }
-    let first = within(ends, [from, middle], least, halvings - 1)?;
-    Some(first.min(within(ends, [middle, to], least, halvings - 1)?))
+    None
 }
 
 /// Both facets at a share of the motion.
