@@ -1,6 +1,6 @@
 //! The plane that separates the convex hulls of two facets, at rest and in motion.
 //!
-//! At rest the normal of the plane is the shortest vector between the hulls, found by the method of Gilbert, Johnson and
+//! At rest the normal of the plane is the shortest vector between the hulls, by the method of Gilbert, Johnson and
 //! Keerthi (IEEE J. Robot. Autom. 4, 1988). In motion the corners of both facets move on straight lines, each at a
 //! constant velocity. Along a fixed normal the distance of two corners is then linear in time: a plane that separates
 //! all corners at both ends of an interval separates the hulls within the interval. Where a plane fails, the interval
