@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release --example certified` draws 200 scenes a line, or as many as the variable `SCENES` says.
 
-use contact_dynamics_random_scenes::surfaces::{Figures, Variant, meetings, run};
+use contact_dynamics_random_scenes::surfaces::{Figures, Meeting, Variant, meetings, run};
 use example_support::output::Output;
 use std::error::Error;
 use std::fmt::Write;
@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| contact | scenes | in contact | steps | halved | of them not certified | ended not certified | ended \
          otherwise | gain energy | cross |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
-    for meeting in meetings().into_iter().filter(|meeting| meeting.keeps_apart()) {
+    for meeting in meetings().into_iter().filter(Meeting::keeps_apart) {
         let mut line = Line::default();
         for seed in 0..seeds {
             let figures = run(meeting, seed, Variant { certified: true, ..Variant::default() });

@@ -78,7 +78,7 @@ fn a_cable_on_a_drum_grips_as_it_should() {
         for links in [12, 48] {
             let found = ratio(links, angle, friction, offset);
             let tan = friction * (0.5 * angle / links as f64).tan();
-            let of_nodes = ((1.0 + tan) / (1.0 - tan)).powi(links as i32);
+            let of_nodes = ((1.0 + tan) / (1.0 - tan)).powf(links as f64);
             assert!((found / of_nodes - 1.0).abs() < 1e-3, "{angle} {friction} {links}: {found}, {of_nodes}");
             misses.push((found / (friction * angle).exp() - 1.0).abs());
         }
