@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn a_handle_in_use_is_busy() {
         let handle = Mutex::new(());
-        let nested = |_: &mut ()| {
+        let nested = |(): &mut ()| {
             assert_eq!(entry(|| locked("run", Some(&handle), |()| Ok(()))), Status::CdBusy);
             Ok(())
         };
