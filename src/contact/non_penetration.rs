@@ -14,9 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 ///
 /// It is a constraint without contacts, beside the constraints that keep the bodies apart. It checks each step before
 /// it is accepted ([`inspect`](ContactConstraint::inspect)) and rejects a step that it cannot certify
-/// ([`Error::NotCertified`]). With [`StepControl`](crate::StepControl) a
-/// rejected step is repeated with half the size. At the smallest size the run stops with
-/// [`Error::StepRefused`](crate::Error::StepRefused): no step is accepted without a certificate.
+/// ([`Error::NotCertified`]). With [`StepControl`](crate::StepControl) a rejected step is repeated with half the size.
+/// At the smallest size the run stops with [`Error::StepRefused`]: no step is accepted without a certificate.
 ///
 /// # What is proven
 ///
@@ -81,11 +80,15 @@ pub struct NonPenetration {
     nodes: Nodes,
     surface: Surface,
     depth: f64,
+    /// How far nodes may move until lists are built again (length).
+    skin: f64,
     /// The pulled nodes of the surface, by their place in it, at the start and at the end of a step.
     pulled: [Vec<Point>; 2],
     positions: Vec<Point>,
     /// Of the facets.
     normals: Vec<Point>,
+    /// Of the facets in their motion.
+    boxes: Vec<Bounds>,
     lists: Neighborhood,
     /// The pulled nodes for which the lists were built.
     listed: Vec<Point>,
@@ -120,11 +123,20 @@ impl NonPenetration {
         let mut nodes = Nodes::new(coordinates, dofs)?;
         let surface = Surface::of_facets(facets, D, &nodes.coordinates)?;
         nodes.read_body(surface.moved_by());
-        let (pulled, positions, listed) = ([Vec::new(), Vec::new()], nodes.coordinates.clone(), Vec::new());
-        let (normals, lists, certificate) = (Vec::new(), Neighborhood::default(), Certificate::default());
-        let mut check = Self { nodes, surface, depth: 0.0, pulled, positions, normals, lists, listed, certificate };
-        check.depth = DEPTH * check.shortest();
-        Ok(check)
+        let shortest = shortest(&surface, &nodes.coordinates);
+        Ok(Self {
+            depth: DEPTH * shortest,
+            skin: SKIN * shortest,
+            pulled: [Vec::new(), Vec::new()],
+            positions: Vec::new(),
+            normals: Vec::new(),
+            boxes: Vec::new(),
+            lists: Neighborhood::default(),
+            listed: Vec::new(),
+            certificate: Certificate::default(),
+            nodes,
+            surface,
+        })
     }
 
     /// How far the surface is pulled into its body before it is checked (length): two bodies may penetrate each other
@@ -143,14 +155,6 @@ impl NonPenetration {
     /// The numbers of certified and rejected steps and the smallest distance, during a run and after it.
     pub fn certificate(&self) -> Certificate {
         self.certificate.clone()
-    }
-
-    /// The shortest side of a facet in the reference configuration.
-    fn shortest(&self) -> f64 {
-        let facets = self.surface.facets().iter().map(Facet::nodes);
-        let sides = facets.flat_map(|nodes| (0..nodes.len()).map(|k| [nodes[k], nodes[(k + 1) % nodes.len()]]));
-        let at = |node: usize| self.nodes.coordinates[node];
-        sides.map(|[one, other]| norm(add_scaled(at(one), -1.0, at(other)))).fold(f64::INFINITY, f64::min)
     }
 
     /// Pulls the surface with displacements u into its body.
@@ -176,32 +180,31 @@ impl NonPenetration {
         (std::array::from_fn(|k| self.pulled[end][places[k.min(count - 1)]]), count)
     }
 
-    /// The box of a facet in its motion.
-    fn swept(&self, facet: usize) -> Bounds {
-        Bounds::of_points([0, 1].into_iter().flat_map(|end| self.corners(facet, end).0))
-    }
-
     /// Whether two facets have a common node.
     fn touch(&self, one: usize, other: usize) -> bool {
         let facets = self.surface.facets();
         facets[one].nodes().iter().any(|node| facets[other].nodes().contains(node))
     }
 
-    /// Lists the facets that are near each other, if nodes have moved too far since they were listed.
+    /// Finds the boxes of the facets in their motion, and lists the facets that are near each other if nodes have moved
+    /// too far since they were listed.
     fn update_lists(&mut self) {
-        let skin = SKIN * self.shortest();
+        let mut boxes = std::mem::take(&mut self.boxes);
+        boxes.clear();
+        boxes.extend(
+            (0..self.surface.facets().len())
+                .map(|facet| Bounds::of_points([0, 1].into_iter().flat_map(|end| self.corners(facet, end).0))),
+        );
+        self.boxes = boxes;
+        let Self { depth, skin, pulled, boxes, lists, listed, .. } = self;
         let moved = |end: &Vec<Point>| {
-            let ways = end.iter().zip(&self.listed).map(|(&x, &listed)| norm(add_scaled(x, -1.0, listed)));
+            let ways = end.iter().zip(&*listed).map(|(&x, &listed)| norm(add_scaled(x, -1.0, listed)));
             ways.fold(0.0, f64::max)
         };
-        if self.listed.len() == self.pulled[0].len() && self.pulled.iter().all(|end| 2.0 * moved(end) <= skin) {
-            return;
+        if listed.len() != pulled[0].len() || pulled.iter().any(|end| 2.0 * moved(end) > *skin) {
+            lists.build(boxes.iter().copied(), boxes.iter().copied(), MEASURED * *depth + *skin);
+            listed.clone_from(&pulled[0]);
         }
-        let boxes: Vec<Bounds> = (0..self.surface.facets().len()).map(|facet| self.swept(facet)).collect();
-        let mut lists = std::mem::take(&mut self.lists);
-        lists.build(boxes.iter().copied(), boxes.iter().copied(), MEASURED * self.depth + skin);
-        self.lists = lists;
-        self.listed.clone_from(&self.pulled[0]);
     }
 
     /// The smallest distance of facets in the motion from the first pulled surface to the second, if any two come near
@@ -209,11 +212,11 @@ impl NonPenetration {
     fn distance(&mut self) -> std::result::Result<Option<f64>, [usize; 2]> {
         self.update_lists();
         let mut smallest: Option<f64> = None;
-        for one in 0..self.surface.facets().len() {
-            let own = self.swept(one);
-            for &other in self.lists.of(one).iter().filter(|&&other| other > one && !self.touch(one, other)) {
-                let others = self.swept(other);
-                if !own.inflated(MEASURED * self.depth).intersects(&others) {
+        for (one, own) in self.boxes.iter().enumerate() {
+            let near = own.inflated(MEASURED * self.depth);
+            for &other in self.lists.of(one).iter().filter(|&&other| other > one) {
+                let others = &self.boxes[other];
+                if !near.intersects(others) || self.touch(one, other) {
                     continue;
                 }
                 let ends = [0, 1].map(|end| [self.corners(one, end), self.corners(other, end)]);
@@ -224,6 +227,13 @@ impl NonPenetration {
         }
         Ok(smallest)
     }
+}
+
+/// The shortest side of a facet.
+fn shortest(surface: &Surface, at: &[Point]) -> f64 {
+    let facets = surface.facets().iter().map(Facet::nodes);
+    let sides = facets.flat_map(|nodes| (0..nodes.len()).map(|k| [nodes[k], nodes[(k + 1) % nodes.len()]]));
+    sides.map(|[one, other]| norm(add_scaled(at[one], -1.0, at[other]))).fold(f64::INFINITY, f64::min)
 }
 
 impl<T: Real> ContactConstraint<T> for NonPenetration {
