@@ -9,20 +9,9 @@ use contact_dynamics_scenes::falls::{Fall, Keeps, Landing};
 use contact_dynamics_scenes::random::{Congruential, xorshift};
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::stacks::Stack;
+use contact_dynamics_scenes::vectors::{along as sum, cross, dot};
 
 type Vector = [f64; 3];
-
-fn sum(x: Vector, c: f64, y: Vector) -> Vector {
-    std::array::from_fn(|i| x[i] + c * y[i])
-}
-
-fn cross(x: Vector, y: Vector) -> Vector {
-    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-}
-
-fn dot(x: Vector, y: Vector) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
 
 /// Name, gap, normal, and (dof, weight) pairs of a row.
 type Found = ((usize, usize), f64, Vector, Vec<(usize, f64)>);

@@ -4,58 +4,39 @@ use contact_dynamics::contact::{BodyContact, ContactConstraint, Facet, NodeToFac
 use contact_dynamics::{Error, GeneralizedAlpha, Result, Simulation, StepControl};
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::vectors::{along, cross, dot, minus, norm};
 
 type Point = [f64; 3];
 
-fn sub(x: Point, y: Point) -> Point {
-    std::array::from_fn(|i| x[i] - y[i])
-}
-
-fn dot(x: Point, y: Point) -> f64 {
-    (0..3).map(|i| x[i] * y[i]).sum()
-}
-
-fn cross(x: Point, y: Point) -> Point {
-    std::array::from_fn(|i| x[(i + 1) % 3] * y[(i + 2) % 3] - x[(i + 2) % 3] * y[(i + 1) % 3])
-}
-
-fn along(x: Point, share: f64, way: Point) -> Point {
-    std::array::from_fn(|i| x[i] + share * way[i])
-}
-
-fn length(x: Point) -> f64 {
-    dot(x, x).sqrt()
-}
-
 fn to_segment(p: Point, [a, b]: [Point; 2]) -> f64 {
-    let side = sub(b, a);
-    let share = (dot(sub(p, a), side) / dot(side, side)).clamp(0.0, 1.0);
-    length(sub(p, along(a, share, side)))
+    let side = minus(b, a);
+    let share = (dot(minus(p, a), side) / dot(side, side)).clamp(0.0, 1.0);
+    norm(minus(p, along(a, share, side)))
 }
 
 fn between_segments(e: [Point; 2], f: [Point; 2]) -> f64 {
-    let (d, g, r) = (sub(e[1], e[0]), sub(f[1], f[0]), sub(e[0], f[0]));
+    let (d, g, r) = (minus(e[1], e[0]), minus(f[1], f[0]), minus(e[0], f[0]));
     let (a, b, c) = (dot(d, d), dot(d, g), dot(g, g));
     let determinant = a * c - b * b;
     let s = (b * dot(g, r) - c * dot(d, r)) / determinant;
     let t = (a * dot(g, r) - b * dot(d, r)) / determinant;
     let inside = [s, t].iter().all(|share| (0.0..=1.0).contains(share));
-    let inner = if inside { length(sub(along(e[0], s, d), along(f[0], t, g))) } else { f64::INFINITY };
+    let inner = if inside { norm(minus(along(e[0], s, d), along(f[0], t, g))) } else { f64::INFINITY };
     let ends = [to_segment(e[0], f), to_segment(e[1], f), to_segment(f[0], e), to_segment(f[1], e)];
     ends.into_iter().fold(inner, f64::min)
 }
 
 fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let normal = cross(sub(b, a), sub(c, a));
-    let foot = along(p, -dot(normal, sub(p, a)) / dot(normal, normal), normal);
-    let inside = [[a, b], [b, c], [c, a]].iter().all(|&[x, y]| dot(normal, cross(sub(y, x), sub(foot, x))) >= 0.0);
-    let inner = if inside { length(sub(p, foot)) } else { f64::INFINITY };
+    let normal = cross(minus(b, a), minus(c, a));
+    let foot = along(p, -dot(normal, minus(p, a)) / dot(normal, normal), normal);
+    let inside = [[a, b], [b, c], [c, a]].iter().all(|&[x, y]| dot(normal, cross(minus(y, x), minus(foot, x))) >= 0.0);
+    let inner = if inside { norm(minus(p, foot)) } else { f64::INFINITY };
     [[a, b], [b, c], [c, a]].into_iter().fold(inner, |least, side| least.min(to_segment(p, side)))
 }
 
 /// Whether a segment goes through a triangle.
 fn pierces([p, q]: [Point; 2], [a, b, c]: [Point; 3]) -> bool {
-    let volume = |x: Point, y: Point, z: Point, w: Point| dot(sub(y, x), cross(sub(z, x), sub(w, x)));
+    let volume = |x: Point, y: Point, z: Point, w: Point| dot(minus(y, x), cross(minus(z, x), minus(w, x)));
     let sides = [volume(p, a, b, c), volume(q, a, b, c)];
     let turns = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
     sides[0] * sides[1] < 0.0 && (turns.iter().all(|x| *x > 0.0) || turns.iter().all(|x| *x < 0.0))
@@ -138,7 +119,7 @@ fn two_facets_in_motion() {
             between(&moved[..counts[0]], &moved[counts[0]..])
         };
         let sampled = (0..=SAMPLES).map(|k| at(k as f64 / SAMPLES as f64)).fold(f64::INFINITY, f64::min);
-        let fastest = u.iter().fold(0.0, |most: f64, u| most.max(length(*u)));
+        let fastest = u.iter().fold(0.0, |most: f64, u| most.max(norm(*u)));
         // Between samples corners of both facets move by this much.
         let between_samples = fastest / SAMPLES as f64;
         if at(0.0) == 0.0 {

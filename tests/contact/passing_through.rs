@@ -8,6 +8,7 @@ use contact_dynamics::{
     StepControl,
 };
 use contact_dynamics_scenes::sparse::free;
+use contact_dynamics_scenes::vectors::{along, dot};
 
 /// Largest error of the energy after the impact, over that before, and of the place, over the way of a step.
 const ENERGY: f64 = 0.12;
@@ -21,14 +22,6 @@ enum Steps {
 
 /// What a straight flight should meet: the time, and the normal there (of the frame in which the surface rests).
 type Meeting<const D: usize> = Option<(f64, [f64; D])>;
-
-fn dot<const D: usize>(x: [f64; D], y: [f64; D]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
-
-fn along<const D: usize>(x: [f64; D], s: f64, v: [f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| x[k] + s * v[k])
-}
 
 /// A particle and further dofs that are held.
 fn particle<const D: usize>(held: usize) -> LinearSystem<'static, f64> {

@@ -5,17 +5,10 @@ use contact_dynamics::Error;
 use contact_dynamics::contact::{ClosedSurface, Cone, Cuboid, Obstacle, Side, Sphere};
 use contact_dynamics_scenes::obstacles::{self, ball_mesh, box_mesh};
 use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::vectors::{along, dot};
 
 fn point<const D: usize>(random: &mut Congruential, size: f64) -> [f64; D] {
     std::array::from_fn(|_| size * random.signed())
-}
-
-fn along<const D: usize>(x: [f64; D], s: f64, w: [f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| x[k] + s * w[k])
-}
-
-fn dot<const D: usize>(x: [f64; D], y: [f64; D]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 /// The normal is the gradient of the distance and of length one, the curvature its second derivative; the distance

@@ -4,20 +4,9 @@ use contact_dynamics::Error;
 use contact_dynamics::contact::{Facet, Surface};
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::vectors::{cross, dot, minus};
 
 const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
-
-fn minus(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| x[i] - y[i])
-}
-
-fn cross(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
-    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-}
-
-fn dot(x: [f64; 3], y: [f64; 3]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
 
 /// The volume within a closed surface of flat facets: the sum of tetrahedra on triangles of its facets.
 fn volume(surface: &Surface, nodes: &[[f64; 3]]) -> f64 {

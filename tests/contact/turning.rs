@@ -12,19 +12,8 @@ use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::obstacles::{tumbling, wheeling};
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::sparse::{free, matrix};
+use contact_dynamics_scenes::vectors::{along, dot, norm};
 use std::f64::consts::TAU;
-
-fn dot<const D: usize>(x: [f64; D], y: [f64; D]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
-}
-
-fn along<const D: usize>(x: [f64; D], s: f64, w: [f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| x[k] + s * w[k])
-}
-
-fn norm<const D: usize>(x: [f64; D]) -> f64 {
-    dot(x, x).sqrt()
-}
 
 /// Particles at these places on an obstacle.
 fn on<'a, const D: usize>(obstacle: impl Obstacle<f64, D> + 'a, places: &[[f64; D]]) -> NodesOnObstacle<'a, f64, D> {

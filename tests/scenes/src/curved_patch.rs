@@ -3,6 +3,7 @@
 use crate::second_order::{Family, SecondOrderStack};
 use crate::solids::{Material, Solid};
 use crate::stacks::Stack;
+use crate::vectors::norm;
 use contact_dynamics::contact::{
     Candidates, ContactConstraint, Contacts, Facet, GapRates, LinearRows, Mortar, NodeToFacet, Rates, Surface,
     Variation,
@@ -49,10 +50,6 @@ fn bend<const D: usize>(x: [f64; D]) -> [f64; D] {
     };
     let length = norm(direction);
     direction.map(|x| radius * x / length)
-}
-
-fn norm<const D: usize>(x: [f64; D]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 impl CurvedPatch<2> {

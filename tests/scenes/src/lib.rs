@@ -39,6 +39,7 @@ pub mod squeeze;
 pub mod stacks;
 pub mod truss;
 pub mod two_slabs;
+pub mod vectors;
 pub mod wall_bar;
 pub mod well;
 

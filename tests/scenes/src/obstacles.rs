@@ -1,6 +1,7 @@
 //! Rigid obstacles of all shapes and motions, and closed meshes of simple bodies.
 
 use crate::random::Congruential;
+use crate::vectors::cross;
 use contact_dynamics::contact::{
     Capsule, ClosedSurface, Cone, Cuboid, Cylinder, Obstacle, Plane, RigidMotion, Side, Sphere,
 };
@@ -106,10 +107,6 @@ pub fn in_plane_of_size(size: f64, random: &mut Congruential) -> Vec<Named<2>> {
     let sides: Vec<_> = (0..10).map(|k| [k, (k + 1) % 10]).collect();
     shapes.push(("star", Box::new(ClosedSurface::new(&star, &sides, rounding).unwrap())));
     shapes
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
 }
 
 /// A tumbling body: its axis, x, turns about z faster and faster while it turns about its axis, and it is carried

@@ -1,5 +1,6 @@
 //! What nonlinear bodies share: nodes with lumped masses and their momenta, and the assembly of element matrices.
 
+use crate::vectors::cross;
 use contact_dynamics::faer::sparse::SymbolicSparseColMat;
 use std::collections::BTreeSet;
 
@@ -141,13 +142,6 @@ impl Particles<3> {
     pub fn rigid_velocity(&self, linear: [f64; 3], rate: [f64; 3], center: [f64; 3]) -> Vec<f64> {
         self.rigid(linear, rate, center)
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
 }
 
 /// A pattern of D × D blocks, and where the blocks of each element are in it.

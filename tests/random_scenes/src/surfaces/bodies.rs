@@ -3,6 +3,7 @@
 use contact_dynamics::contact::{Facet, Surface};
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::{Material, Solid};
+use contact_dynamics_scenes::vectors::dot;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// One of some choices.
@@ -117,10 +118,6 @@ pub(super) fn rotation<const D: usize>(random: &mut Congruential) -> [[f64; D]; 
 fn determinant<const D: usize>(rows: &[[f64; D]; D]) -> f64 {
     let minor = |j: usize, k: usize| rows[D - 2][j] * rows[D - 1][k] - rows[D - 2][k] * rows[D - 1][j];
     if D == 2 { minor(0, 1) } else { (0..3).map(|i| rows[0][i] * minor((i + 1) % 3, (i + 2) % 3)).sum() }
-}
-
-pub(super) fn dot<const D: usize>(x: [f64; D], y: [f64; D]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 pub(super) fn turned<const D: usize>(rotation: &[[f64; D]; D], x: [f64; D]) -> [f64; D] {

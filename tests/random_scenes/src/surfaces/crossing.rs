@@ -1,6 +1,7 @@
 //! Whether facets of a scene have gone through each other: edges through triangles, in the plane sides through sides.
 
 use contact_dynamics::contact::Facet;
+use contact_dynamics_scenes::vectors::{along, cross, dot, minus, norm};
 
 /// Two facets without a common node that cross, if there are any, after their nodes have been moved by `depth` against
 /// the mean of the normals around them.
@@ -10,9 +11,9 @@ pub(super) fn crossing<const D: usize>(facets: &[Facet], positions: &[[f64; D]],
     let mut outward = vec![[0.0; 3]; places.len()];
     for facet in facets {
         let normal = scaled(normal(facet, &places), 1.0);
-        facet.nodes().iter().for_each(|&node| outward[node] = plus(outward[node], normal));
+        facet.nodes().iter().for_each(|&node| outward[node] = along(outward[node], 1.0, normal));
     }
-    let pulled: Vec<_> = places.iter().zip(&outward).map(|(&x, &n)| plus(x, scaled(n, -depth))).collect();
+    let pulled: Vec<_> = places.iter().zip(&outward).map(|(&x, &n)| along(x, 1.0, scaled(n, -depth))).collect();
     let touch = |one: &Facet, other: &Facet| one.nodes().iter().any(|node| other.nodes().contains(node));
     for (one, facet) in facets.iter().enumerate() {
         for (other, against) in facets.iter().enumerate().filter(|(_, against)| !touch(facet, against)) {
@@ -54,24 +55,8 @@ fn normal(facet: &Facet, at: &[[f64; 3]]) -> [f64; 3] {
     }
 }
 
-fn plus(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| x[k] + y[k])
-}
-
-fn minus(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| x[k] - y[k])
-}
-
-fn dot(x: [f64; 3], y: [f64; 3]) -> f64 {
-    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-}
-
-fn cross(x: [f64; 3], y: [f64; 3]) -> [f64; 3] {
-    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-}
-
 /// A vector of this length in the direction of another one.
 fn scaled(x: [f64; 3], length: f64) -> [f64; 3] {
-    let share = length / dot(x, x).sqrt();
+    let share = length / norm(x);
     if share.is_finite() { x.map(|x| share * x) } else { [0.0; 3] }
 }

@@ -1,7 +1,7 @@
 //! A scene by chance: bodies, velocities, units, step size, and what keeps the bodies where they may be.
 
 use super::Variant;
-use super::bodies::{Body, decades, dot, pick, rotation, turned};
+use super::bodies::{Body, decades, pick, rotation, turned};
 use super::crossing::crossing;
 use super::meeting::{Between, Carried, Kind, Meeting};
 use super::space::{Boxed, Dimension, Space};
@@ -14,6 +14,7 @@ use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::random::Congruential;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use contact_dynamics_scenes::sparse::{entries, matrix};
+use contact_dynamics_scenes::vectors::dot;
 
 /// Units that all numbers of a scene are multiplied by.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! What differs between the plane and space: shapes of obstacles, turning, edges.
 
-use super::bodies::dot;
 use contact_dynamics::Result;
 use contact_dynamics::contact::{ContactConstraint, EdgeToEdge, Facet, Obstacle, RigidMotion, SurfaceSettings};
 use contact_dynamics_scenes::obstacles::{Named, in_plane_of_size, in_space_of_size};
 use contact_dynamics_scenes::random::Congruential;
+use contact_dynamics_scenes::vectors::dot;
 
 /// Of D dimensions.
 pub(super) struct Space<const D: usize>;
