@@ -284,7 +284,7 @@ typedef struct {
    */
   size_t feature;
   /*
-   What is opposite to the feature, if there are several.
+   The facet or other object opposite to the feature, if there are several.
    */
   size_t candidate;
   /*
@@ -371,8 +371,7 @@ extern "C" {
 /*
  Adds contacts with the gaps G u + gaps ≥ 0. G (dofs are its columns) has a row for each contact, along which its
  force acts; gaps (one for each row; length) are those at u = 0. `tangents` has one or two rows for each row of G,
- along which bodies slide: those of the first contact before those of the second. It is NULL without friction. With the law
- "equality" gaps stay zero.
+ along which bodies slide, contact after contact; NULL without friction. With the law "equality" gaps stay zero.
 
  The laws of all contacts: "rigid", "restitution coefficient=…", "penalty stiffness=…", "power stiffness=…
  exponent=…", "hertz modulus=… radius=…", "kelvin-voigt stiffness=… damping=…", "hunt-crossley stiffness=…

@@ -29,7 +29,7 @@ pub(crate) type MotionFunction = unsafe extern "C" fn(f64, *mut f64, *mut c_void
 pub(crate) type GapFunction =
     unsafe extern "C" fn(f64, *const f64, *const f64, *mut f64, usize, *mut f64, *mut c_void) -> c_int;
 
-/// What a callback returns for a state that it cannot evaluate: CD_INADMISSIBLE of the header.
+/// The result of a callback that cannot evaluate a state: CD_INADMISSIBLE of the header.
 const INADMISSIBLE: c_int = 1;
 
 /// A function of the host and what it is called with.
@@ -39,8 +39,8 @@ pub(crate) struct Callback<F> {
     pub(crate) user: *mut c_void,
 }
 
-// SAFETY: the library passes `user` on to the function and does nothing else with it. The header asks for functions
-// that can be called in any thread that uses the handle, by one at a time.
+// SAFETY: the library only passes `user` on to the function. The header asks for functions that can be called in any
+// thread that uses the handle, by one at a time.
 unsafe impl<F: Send> Send for Callback<F> {}
 
 fn outcome(callback: &'static str, code: c_int) -> Result<()> {

@@ -79,7 +79,7 @@ pub extern "C" fn cd_version() -> *const c_char {
 
 /// Runs the body of a function and keeps the message of its error. A panic becomes one.
 pub(crate) fn entry(body: impl FnOnce() -> Result<()>) -> Status {
-    // What a panic leaves incomplete is behind the lock of a handle, which is poisoned then.
+    // Incomplete data after a panic are behind the lock of a handle, which is poisoned then.
     let Fault { status, text } = match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(())) => return Status::CdOk,
         Ok(Err(fault)) => fault,

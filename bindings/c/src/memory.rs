@@ -116,7 +116,7 @@ pub(crate) unsafe fn create<T>(out: *mut *mut T, make: impl FnOnce() -> Result<T
     })
 }
 
-/// What a handle refers to, unless it is NULL.
+/// The object of a handle, unless the handle is NULL.
 ///
 /// # Safety
 ///

@@ -1,4 +1,4 @@
-//! Models: what a run is built from. They are plain data and makers, so that one model makes any number of runs.
+//! Models, from which runs are built: plain data and makers, so that one model makes any number of runs.
 
 use crate::callback::{Callback, Load, LoadFunction, Motion, MotionFunction};
 use crate::contact::MakeContact;

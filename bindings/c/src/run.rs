@@ -39,7 +39,7 @@ pub struct Contact {
     pub constraint: usize,
     /// The row of cd_model_rows, or the node.
     pub feature: usize,
-    /// What is opposite to the feature, if there are several.
+    /// The facet or other object opposite to the feature, if there are several.
     pub candidate: usize,
     /// Its status.
     pub status: ContactStatus,
