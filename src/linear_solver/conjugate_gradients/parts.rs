@@ -118,3 +118,58 @@ fn sorted<I: Iterator<Item = (u32, u32)>>(
     starts.pop();
     Ok((starts, entries))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of which each couples with the one before and with the one `width` before.
+    fn strip(rows: usize, width: u32) -> (Vec<usize>, Vec<u32>) {
+        let (mut pointers, mut columns) = (vec![0], Vec::new());
+        for row in (0..).take(rows) {
+            columns.extend([width, 1].iter().filter(|&&back| back <= row).map(|back| row - back));
+            pointers.push(columns.len());
+        }
+        (pointers, columns)
+    }
+
+    #[test]
+    fn parts_of_a_strip_couple_only_with_the_rows_behind_them() {
+        const ROWS: usize = 60_000;
+        let (mut pointers, mut columns) = strip(ROWS, 50);
+        let given = (pointers.clone(), columns.clone());
+        let parts = Parts::find(&pointers, &columns, 3).unwrap();
+        assert_eq!(parts.ends.len(), MOST_PARTS);
+        assert_eq!(parts.ends.last(), Some(&(ROWS - (MOST_PARTS - 1) * 50)));
+        parts.sort(&mut pointers, &mut columns).unwrap();
+        let row = |place: usize| &columns[pointers[place]..pointers[place + 1]];
+        let mut start = 0;
+        for &end in &parts.ends {
+            assert!((start..end).all(|place| row(place).iter().all(|&column| column as usize >= start)));
+            start = end;
+        }
+        assert!((0..ROWS).all(|place| row(place).is_sorted_by(|one, other| one < other)));
+        // The same couplings, at their places.
+        for one in 0..ROWS {
+            for &other in &given.1[given.0[one]..given.0[one + 1]] {
+                let places = [parts.place(one), parts.place(other as usize)];
+                let column = u32::try_from(places[0].min(places[1])).unwrap();
+                assert!(row(places[0].max(places[1])).binary_search(&column).is_ok());
+            }
+        }
+        assert_eq!(columns.len(), given.1.len());
+        assert!((0..ROWS).step_by(997).all(|one| parts.dof(3 * parts.place(one) + 2, 3) == 3 * one + 2));
+    }
+
+    #[test]
+    fn small_matrices_and_scattered_numberings_have_no_parts() {
+        for (rows, width, size) in [(60_000, 20_000, 3), (1000, 50, 3), (60_000, 50, 1)] {
+            let (mut pointers, mut columns) = strip(rows, width);
+            let given = (pointers.clone(), columns.clone());
+            let parts = Parts::find(&pointers, &columns, size).unwrap();
+            parts.sort(&mut pointers, &mut columns).unwrap();
+            assert!(parts.ends.is_empty() && (pointers, columns) == given);
+            assert_eq!((parts.place(7), parts.dof(22, 3)), (7, 22));
+        }
+    }
+}
