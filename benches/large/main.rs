@@ -28,9 +28,6 @@ const SPEED: f64 = 0.01;
 
 fn main() -> Result<()> {
     let is_given = |word: &str| std::env::args().any(|argument| argument == word);
-    println!(
-        "Chung-Hulbert with default corrections, Courant number 1, conjugate gradients but where a factor is named"
-    );
     println!("a pass over a gigabyte of memory takes {:.3} s on one thread", bandwidth());
     if is_given("heap") {
         heaps(&Arguments::read(&[20, 40, 60, 80, 100], &[4]))
@@ -149,6 +146,9 @@ fn row(name: &str, dofs: usize, builder: impl FnOnce() -> Result<SimulationBuild
 
 fn header() {
     println!(
+        "Chung-Hulbert with default corrections, Courant number 1, conjugate gradients but where a factor is named"
+    );
+    println!(
         "{:<12} {:>8} {:>7} {:>9} {:>8} {:>8} {:>8} {:>8} {:>9}",
         "scene", "dofs", "closed", "products", "open, s", "first, s", "step, s", "build, s", "peak, GiB"
     );
@@ -223,6 +223,7 @@ fn courants(arguments: &Arguments) -> Result<()> {
 
 /// The largest difference of a force from that by a factor and W, relative to the largest force.
 fn exact(arguments: &Arguments) -> Result<()> {
+    println!("Chung-Hulbert with default corrections, Courant number 1");
     for &cells in &arguments.sizes {
         let grid = slab(cells);
         let builder = || falling(&grid, step(&grid, 1.0));
