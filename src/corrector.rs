@@ -23,7 +23,7 @@ pub(crate) use buffers::Buffers;
 pub use contact_implicit::{ContactImplicit, ContactStabilized};
 pub use correction::Correction;
 pub(crate) use correction::{Before, Bodies, Erased, Past, Scheme};
-pub(crate) use jump_problem::{Block, JumpProblem};
+pub(crate) use jump_problem::{Block, FrictionOf, JumpProblem};
 pub use jump_projection::JumpProjection;
 pub use laursen_love::LaursenLove;
 pub use nonsmooth_splitting::NonsmoothSplitting;

@@ -9,7 +9,7 @@ use crate::contact_solver::{
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::{half_digits, rounding, share_of_rounding};
+use crate::rounding::{half_digits, rounding};
 
 /// A contact of the problem.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +39,15 @@ impl<T: Real> Block<T> {
     fn is_equation(&self) -> bool {
         let Self { tangents, set, direction, compliance, known, .. } = *self;
         tangents == 0 && set == AdmissibleSet::Free && direction.is_none() && compliance == T::zero() && known.is_none()
+    }
+
+    /// Whether it slides with friction.
+    fn slides(&self) -> bool {
+        self.direction.is_some_and(|direction| direction != [T::zero(); 2])
+    }
+
+    fn take_friction(&mut self) {
+        self.direction = self.direction.map(|_| [T::zero(); 2]);
     }
 
     /// The range of its rows in the lists of the problem.
@@ -72,13 +81,13 @@ pub(crate) struct JumpProblem<T> {
     pub(super) many: Option<Box<ManyJumps<T>>>,
 }
 
-/// How the friction of sliding contacts enters a problem.
+/// The normal multipliers of sliding contacts that come with friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Friction {
-    /// Proportional to the unknown normal multiplier.
-    Follows,
-    /// Fixed at its value in the totals; also used if nothing slides.
-    Lags,
+pub(crate) enum FrictionOf {
+    /// Forces and impulses: those that press.
+    Pressing,
+    /// Changes of them: those of either sign.
+    Changes,
 }
 
 /// Rows that S couples, as a problem for a contact solver.
@@ -89,10 +98,14 @@ struct Group<T> {
     /// The unknowns: the position of each one's row in the group. A sliding contact has one, its normal multiplier.
     unknowns: Vec<usize>,
     delassus: Vec<T>,
+    /// What of it is the friction of sliding contacts; empty if none slides.
+    friction: Vec<T>,
     offset: Vec<T>,
     sets: Vec<AdmissibleSet>,
     tolerance: Vec<T>,
     multipliers: Vec<T>,
+    /// Multipliers of the next pass of an iteration.
+    next: Vec<T>,
     factor: DenseCholesky<T>,
     /// Rows that the factor has memory for.
     reserved: usize,
@@ -168,13 +181,12 @@ impl<T: Real> JumpProblem<T> {
         }
     }
 
-    /// Finds the totals group by group; S couples no two groups. Multipliers press if they have the sign of
-    /// `presses`. `id` gives the contact of a row for an error at time t.
+    /// Finds the totals group by group; S couples no two groups. `id` gives the contact of a row for an error at t.
     pub(crate) fn solve(
         &mut self,
         (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
         solver: &mut dyn ContactSolver<T>,
-        presses: T,
+        friction: FrictionOf,
         (t, id): (f64, impl Fn(usize) -> ContactId),
     ) -> Result<()> {
         for values in [&mut self.totals, &mut self.left, &mut self.noise] {
@@ -195,10 +207,10 @@ impl<T: Real> JumpProblem<T> {
         }
         let mut group = std::mem::take(&mut self.group);
         let result = (0..projection.groups().len()).try_for_each(|number| {
-            if is_large && self.solve_without_s((g, projection), (number, least), presses)? {
+            if is_large && self.solve_without_s((g, projection), (number, least), friction)? {
                 return Ok(());
             }
-            self.solve_with_s((g, projection), (number, &mut group), solver, presses, (t, &id))
+            self.solve_with_s((g, projection), (number, &mut group), solver, friction, (t, &id))
         });
         self.group = group;
         self.increments.clear();
@@ -212,7 +224,7 @@ impl<T: Real> JumpProblem<T> {
         (g, projection): (&ContactJacobian<T>, &mut JumpProjection<T>),
         (number, group): (usize, &mut Group<T>),
         solver: &mut dyn ContactSolver<T>,
-        presses: T,
+        friction: FrictionOf,
         (t, id): (f64, &impl Fn(usize) -> ContactId),
     ) -> Result<()> {
         // Positions of a group ascend, and a block is in one group.
@@ -220,7 +232,7 @@ impl<T: Real> JumpProblem<T> {
         group.rows.extend(projection.groups().group(number).iter().map(|&position| self.rows[position]));
         projection.assemble(g, &group.rows, &mut group.s)?;
         let positions = projection.groups().group(number);
-        self.solve_group(positions, group, solver, presses).map_err(|failure| {
+        self.solve_group(positions, group, solver, friction).map_err(|failure| {
             let owner = |unknown: usize| self.owners[positions[group.unknowns[unknown]]];
             contact_error(t, failure, |unknown| id(self.blocks[owner(unknown)].row))
         })
@@ -243,56 +255,68 @@ impl<T: Real> JumpProblem<T> {
         Ok(())
     }
 
-    /// Solves for the rows at these positions. A sliding contact whose multiplier would pull gets no friction, and
-    /// the problem is solved again.
+    /// Solves for the rows at these positions. A sliding contact whose force would pull gets no friction, and the
+    /// problem is solved again. If it has no solution with the friction of sliding contacts, none of them gets any.
     fn solve_group(
         &mut self,
         positions: &[usize],
         group: &mut Group<T>,
         solver: &mut dyn ContactSolver<T>,
-        presses: T,
+        friction: FrictionOf,
     ) -> Solved<T> {
         loop {
-            let follows = positions.iter().any(|&position| self.blocks[self.owners[position]].direction.is_some());
-            let friction = if follows { Friction::Follows } else { Friction::Lags };
-            group.pose(self, positions, friction);
+            group.pose(self, positions);
+            let slides = positions.iter().any(|&position| self.blocks[self.owners[position]].slides());
             if let Err(failure) = group.solve(solver, friction) {
-                return match group.jammed(self, positions) {
-                    Some(jammed) => Err(jammed),
-                    None if follows => self.solve_lagging(positions, group, solver, presses).map_err(|_| failure),
-                    None => Err(failure),
-                };
+                if let Some(jammed) = group.jammed(self, positions) {
+                    return Err(jammed);
+                }
+                if !slides {
+                    return Err(failure);
+                }
+                for &position in positions {
+                    self.blocks[self.owners[position]].take_friction();
+                }
+                continue;
             }
-            let mut again = false;
             for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
                 let position = positions[at];
-                let block = &mut self.blocks[self.owners[position]];
                 self.totals[position] = multiplier;
-                let Some(direction) = block.direction else { continue };
-                for (k, along) in direction.into_iter().enumerate().take(block.tangents) {
+                let Block { direction, tangents, .. } = self.blocks[self.owners[position]];
+                for (k, along) in direction.into_iter().flatten().enumerate().take(tangents) {
                     self.totals[position + 1 + k] = along * multiplier;
                 }
-                if presses * multiplier < T::zero() && direction != [T::zero(); 2] {
-                    (block.direction, again) = (Some([T::zero(); 2]), true);
-                }
             }
-            if !again {
+            if friction == FrictionOf::Changes || !self.take_friction_of_pulling(positions) {
                 break;
             }
         }
-        self.keep_in_cones(positions, presses);
+        self.keep_in_cones(positions);
         self.measure(positions, group);
         Ok(())
     }
 
+    /// Takes the friction from sliding contacts whose multipliers pull; returns whether there are any.
+    pub(super) fn take_friction_of_pulling(&mut self, positions: &[usize]) -> bool {
+        let mut any = false;
+        for &position in positions {
+            let block = &mut self.blocks[self.owners[position]];
+            if block.place == position && block.slides() && self.totals[position] < T::zero() {
+                block.take_friction();
+                any = true;
+            }
+        }
+        any
+    }
+
     /// Scales friction back into its cone if it was accepted outside as rounding. Next to much heavier bodies this
     /// rounding far exceeds the rounding of the local contact forces.
-    pub(super) fn keep_in_cones(&mut self, positions: &[usize], presses: T) {
+    pub(super) fn keep_in_cones(&mut self, positions: &[usize]) {
         for &position in positions {
             let block = self.blocks[self.owners[position]];
             let is_found = block.place == position && block.direction.is_none() && block.known.is_none();
             let Some(friction) = block.set.friction().filter(|_| is_found) else { continue };
-            let bound = T::of(friction) * (presses * self.totals[position]).max(T::zero());
+            let bound = T::of(friction) * self.totals[position].max(T::zero());
             let tangential = &mut self.totals[position + 1..=position + block.tangents];
             let size = tangential.iter().fold(T::zero(), |size, &f| size.hypot(f));
             if size > (T::one() + half_digits::<T>()) * bound {
@@ -301,74 +325,6 @@ impl<T: Real> JumpProblem<T> {
                 }
             }
         }
-    }
-
-    /// Solves by iteration with lagged friction if the equations with following friction have no solution because a
-    /// sliding contact would pull. Each iteration fixes the friction of sliding contacts and solves for the others.
-    fn solve_lagging(
-        &mut self,
-        positions: &[usize],
-        group: &mut Group<T>,
-        solver: &mut dyn ContactSolver<T>,
-        presses: T,
-    ) -> Solved<T> {
-        /// Largest number of iterations, each relaxed by one half. The error after the last one is accepted: the
-        /// reported friction is in its cone, and the remaining jump is a jump of accelerations.
-        const PASSES: usize = 60;
-        /// Growth of the change per iteration that counts as divergence. It may occur with nearly equal rows, of
-        /// which one pulls while the other presses. Sliding contacts then get no friction.
-        const DIVERGES: f64 = 1e2;
-        let half = T::of(0.5);
-        for &position in positions {
-            self.totals[position] = T::zero();
-        }
-        let (mut least, mut diverges) = (T::infinity(), false);
-        for _ in 0..PASSES {
-            group.pose(self, positions, Friction::Lags);
-            group.solve(solver, Friction::Lags)?;
-            let (mut change, mut largest) = (T::zero(), T::zero());
-            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
-                let position = positions[at];
-                let block = &self.blocks[self.owners[position]];
-                self.totals[position] = multiplier;
-                for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
-                    let pressing = presses * (presses * multiplier).max(T::zero());
-                    let friction = &mut self.totals[position + 1 + k];
-                    let moved = half * (along * pressing - *friction);
-                    *friction += moved;
-                    (change, largest) = (change.max(moved.abs()), largest.max(friction.abs()));
-                }
-            }
-            if change <= share_of_rounding::<T>() * largest {
-                break;
-            }
-            least = least.min(change);
-            diverges = change > T::of(DIVERGES) * least || !change.is_finite();
-            if diverges {
-                break;
-            }
-        }
-        if diverges {
-            for &position in positions {
-                self.totals[position] = T::zero();
-            }
-            group.pose(self, positions, Friction::Lags);
-            group.solve(solver, Friction::Lags)?;
-            for (&at, &multiplier) in group.unknowns.iter().zip(&group.multipliers) {
-                self.totals[positions[at]] = multiplier;
-            }
-            self.measure(positions, group);
-            return Ok(());
-        }
-        for &at in &group.unknowns {
-            let (position, block) = (positions[at], &self.blocks[self.owners[positions[at]]]);
-            let pressing = presses * (presses * self.totals[position]).max(T::zero());
-            for (k, along) in block.direction.into_iter().flatten().enumerate().take(block.tangents) {
-                self.totals[position + 1 + k] = along * pressing;
-            }
-        }
-        self.measure(positions, group);
-        Ok(())
     }
 
     /// Computes the remaining jumps of a group.
@@ -390,14 +346,14 @@ impl<T: Real> Group<T> {
     /// Reserves memory for this many rows.
     fn make_room(&mut self, rows: usize) {
         self.reserve_factor(rows);
-        let Self { rows: own, s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
+        let Self { rows: own, s, unknowns, delassus, friction, offset, sets, tolerance, multipliers, next, .. } = self;
         for list in [own, unknowns] {
             list.reserve(rows.saturating_sub(list.len()));
         }
-        for matrix in [s, delassus] {
+        for matrix in [s, delassus, friction] {
             matrix.reserve((rows * rows).saturating_sub(matrix.len()));
         }
-        for values in [offset, tolerance, multipliers] {
+        for values in [offset, tolerance, multipliers, next] {
             values.reserve(rows.saturating_sub(values.len()));
         }
         sets.reserve(rows.saturating_sub(sets.len()));
@@ -411,11 +367,12 @@ impl<T: Real> Group<T> {
 
     /// Sets up the problem of the rows at these positions, with S given: one unknown per row, but a single unknown
     /// per sliding contact, whose friction is proportional to the normal multiplier.
-    fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize], friction: Friction) {
+    fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize]) {
         let size = positions.len();
-        let Self { s, unknowns, delassus, offset, sets, tolerance, multipliers, .. } = self;
+        let Self { s, unknowns, delassus, friction, offset, sets, tolerance, multipliers, .. } = self;
         let block = |at: usize| &all.blocks[all.owners[positions[at]]];
-        for values in [&mut *delassus, offset, tolerance, multipliers] {
+        let slides = (0..size).any(|at| block(at).slides());
+        for values in [&mut *delassus, friction, offset, tolerance, multipliers] {
             values.clear();
         }
         unknowns.clear();
@@ -441,46 +398,65 @@ impl<T: Real> Group<T> {
                 offset.push(-pivot * multiplier);
                 tolerance.push(T::zero());
                 delassus.extend(unknowns.iter().map(|&j| if i == j { pivot } else { T::zero() }));
+                friction.extend(unknowns.iter().filter(|_| slides).map(|_| T::zero()));
                 continue;
             }
             let (mut contained, mut terms) = (T::zero(), T::zero());
             for (j, &position) in positions.iter().enumerate() {
-                let lags = friction == Friction::Lags && block(j).direction.is_some() && block(j).place < position;
-                let base = all.base[position] - if lags { all.totals[position] } else { T::zero() };
-                contained += entry(j) * base;
-                terms += (entry(j) * base).abs();
+                contained += entry(j) * all.base[position];
+                terms += (entry(j) * all.base[position]).abs();
             }
             offset.push(all.jump[positions[i]] - contained);
             tolerance.push(all.tolerance[positions[i]] + rounding(terms));
             for &j in unknowns.iter() {
                 let Block { tangents, direction, compliance, place, .. } = *block(j);
-                let mut sum = if known(j).is_some() { T::zero() } else { entry(j) };
-                if let Some(direction) = direction.filter(|_| friction == Friction::Follows) {
-                    sum += (0..tangents).map(|k| direction[k] * entry(j + 1 + k)).sum::<T>();
-                }
-                delassus.push(if i == j && positions[j] == place { sum + compliance } else { sum });
+                let own = if known(j).is_some() { T::zero() } else { entry(j) };
+                let along = direction.into_iter().flatten().enumerate().take(tangents);
+                let rubbed = along.map(|(k, along)| along * entry(j + 1 + k)).sum::<T>();
+                let diagonal = if i == j && positions[j] == place { compliance } else { T::zero() };
+                delassus.push(own + rubbed + diagonal);
+                friction.extend(slides.then_some(rubbed));
             }
         }
         multipliers.resize(unknowns.len(), T::zero());
     }
 
-    /// Solves the problem. Equations alone, with a symmetric W, are solved in the least norm, however rounding has
-    /// changed dependent rows.
-    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, friction: Friction) -> Solved<T> {
-        let size = self.offset.len();
-        if friction == Friction::Lags && self.sets.iter().all(|&set| set == AdmissibleSet::Free) {
-            self.reserve_factor(size);
-            let Self { delassus, offset, multipliers, factor, .. } = self;
-            let failure = |row| ContactFailure::NotConverged { iterations: 0, row, residual: T::nan() };
-            factor.factorize(size, |i, j| delassus[i * size + j]).map_err(failure)?;
-            for (multiplier, &offset) in multipliers.iter_mut().zip(offset.iter()) {
-                *multiplier = -offset;
-            }
-            factor.solve(multipliers);
-            return Ok(());
+    /// Solves the problem. Equations alone are solved in the least norm, however rounding has changed dependent rows.
+    fn solve(&mut self, solver: &mut dyn ContactSolver<T>, of: FrictionOf) -> Solved<T> {
+        if self.sets.iter().all(|&set| set == AdmissibleSet::Free) {
+            return self.solve_equations(of);
         }
         let Self { delassus, offset, sets, tolerance, multipliers, .. } = self;
         solver.solve(&ContactProblem::of(delassus, offset, sets, tolerance, 0), multipliers).map(|_| ())
+    }
+
+    /// Solves equations. The friction of sliding contacts is that of the pass before, until it no longer changes. Each
+    /// pass has the least norm, so that dependent rows do not press and pull by arbitrary forces.
+    fn solve_equations(&mut self, of: FrictionOf) -> Solved<T> {
+        /// Friction of a normal force changes that force by some tenths of its size at most, except near jamming.
+        const PASSES: usize = 100;
+        let size = self.offset.len();
+        self.reserve_factor(size);
+        let Self { delassus, friction, offset, multipliers, next, factor, .. } = self;
+        let slides = !friction.is_empty();
+        let friction = |i: usize, j: usize| friction.get(i * size + j).copied().unwrap_or(T::zero());
+        let failure = |iterations| move |row| ContactFailure::NotConverged { iterations, row, residual: T::nan() };
+        factor.factorize(size, |i, j| delassus[i * size + j] - friction(i, j)).map_err(failure(0))?;
+        multipliers.fill(T::zero());
+        next.resize(size, T::zero());
+        for _ in 0..PASSES {
+            for (i, next) in next.iter_mut().enumerate() {
+                let rubs = |&j: &usize| of == FrictionOf::Changes || multipliers[j] > T::zero();
+                *next = -offset[i] - (0..size).filter(rubs).map(|j| friction(i, j) * multipliers[j]).sum::<T>();
+            }
+            factor.solve(next);
+            std::mem::swap(multipliers, next);
+            let change = multipliers.iter().zip(next.iter()).fold(T::zero(), |most, (&x, &y)| most.max((x - y).abs()));
+            if !slides || change <= rounding(T::largest(multipliers)) {
+                return Ok(());
+            }
+        }
+        Err(failure(PASSES)(0))
     }
 
     /// A sliding contact that friction jams.

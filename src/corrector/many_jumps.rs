@@ -2,7 +2,7 @@
 //! factorized so.
 
 use super::JumpProjection;
-use super::jump_problem::JumpProblem;
+use super::jump_problem::{FrictionOf, JumpProblem};
 use crate::contact::ContactJacobian;
 use crate::contact_solver::{AdmissibleSet, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
@@ -39,7 +39,7 @@ impl<T: Real> JumpProblem<T> {
         &mut self,
         (g, projection): (&ContactJacobian<T>, &JumpProjection<T>),
         (group, least): (usize, usize),
-        presses: T,
+        friction: FrictionOf,
     ) -> Result<bool> {
         let (positions, Some(inverse)) = (projection.groups().group(group), projection.lumped()) else {
             return Ok(false);
@@ -54,29 +54,17 @@ impl<T: Real> JumpProblem<T> {
                 self.many = Some(many);
                 return Ok(false);
             }
-            if !self.keep(&many.multipliers, positions, presses) {
+            for (&position, &multiplier) in positions.iter().zip(&many.multipliers) {
+                self.totals[position] = multiplier;
+            }
+            if friction == FrictionOf::Changes || !self.take_friction_of_pulling(positions) {
                 break;
             }
         }
-        self.keep_in_cones(positions, presses);
+        self.keep_in_cones(positions);
         many.measure(self, g, (positions, inverse));
         self.many = Some(many);
         Ok(true)
-    }
-
-    /// Takes the multipliers over. A sliding contact whose multiplier would pull gets no friction: returns whether
-    /// there is any.
-    fn keep(&mut self, multipliers: &[T], positions: &[usize], presses: T) -> bool {
-        let mut again = false;
-        for (&position, &multiplier) in positions.iter().zip(multipliers) {
-            self.totals[position] = multiplier;
-            let block = &mut self.blocks[self.owners[position]];
-            let pulls = block.place == position && presses * multiplier < T::zero();
-            if pulls && block.direction.is_some_and(|direction| direction != [T::zero(); 2]) {
-                (block.direction, again) = (Some([T::zero(); 2]), true);
-            }
-        }
-        again
     }
 }
 

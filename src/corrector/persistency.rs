@@ -44,10 +44,10 @@ pub enum HistoryProjection {
 /// [`apply_impulses`](Correction::apply_impulses) explains the effect of damping on a, and
 /// [`push_acceleration`](Correction::push_acceleration) the reduction of λ_v if a step does not resolve the damping.
 /// p' is the reported force; the raw p still decides release. Rows that touch without pressure are corrected only if
-/// they approach. Linear momentum is conserved, and the correction never raises the kinetic energy: an impact costs ½
-/// jumpᵀ S⁻¹ jump, which is 1/(2n) of the energy of two equal bars of n elements. With [`HistoryProjection::On`] the
-/// past states of a newly closed contact are projected too; multistep schemes need it, one-step schemes that read no
-/// past ignore it.
+/// they approach, and contacts with friction keep the law of Coulomb: they do not pull. Linear momentum is conserved,
+/// and the correction never raises the kinetic energy: an impact costs ½ jumpᵀ S⁻¹ jump, which is 1/(2n) of the energy
+/// of two equal bars of n elements. With [`HistoryProjection::On`] the past states of a newly closed contact are
+/// projected too; multistep schemes need it, one-step schemes that read no past ignore it.
 ///
 /// It works with schemes that impose contact on the displacements of the state; with others ([`ContactLevel`]) the
 /// build fails.

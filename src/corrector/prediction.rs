@@ -1,7 +1,7 @@
 //! Data for a corrector before a stage is solved: the predicted displacements and their projection onto the contact
 //! conditions.
 
-use super::jump_problem::Block;
+use super::jump_problem::{Block, FrictionOf};
 use super::{Buffers, JumpProblem, JumpProjection};
 use crate::contact::{ContactJacobian, ErasedGaps};
 use crate::contact_solver::{AdmissibleSet, ContactSolver};
@@ -130,6 +130,6 @@ impl<T: Real> Prediction<'_, T> {
             problem.add_block(&Block::new(row, 0, AdmissibleSet::from(constraints.0.law(row))));
             problem.add_row(row, gap, error, T::zero());
         }
-        problem.solve((g, projection), &mut **solver, T::one(), (self.new.t, |row| contacts.ids[row]))
+        problem.solve((g, projection), &mut **solver, FrictionOf::Pressing, (self.new.t, |row| contacts.ids[row]))
     }
 }

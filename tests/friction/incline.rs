@@ -65,6 +65,47 @@ fn a_block_comes_to_rest_and_stays() {
     }
 }
 
+/// A gutter of three walls, more than a block in it needs: whatever the share of each, walls press and do not pull,
+/// their forces carry the block, and it slows down by no less than on a floor and no more than in a gutter of two walls.
+#[test]
+fn a_block_slides_in_a_gutter_of_more_walls_than_it_needs() {
+    const FRICTION: f64 = 0.3;
+    // The walls take turns, and the block moves a little across.
+    const SLACK: f64 = 0.1;
+    for tilt in [1e-4, 0.01, 0.1, 0.4] {
+        for (scheme, height) in schemes().flat_map(|scheme| [0.0, 0.02].map(|height| (scheme, height))) {
+            let name = format!("{}, walls tilted by {tilt}, from {height}", scheme.name());
+            // Along the gutter, across, up.
+            let weight = 2.0 * GRAVITY;
+            let block = masses(vec![2.0; 3], vec![0.0, 0.0, -weight]).unwrap();
+            let walls = [-tilt, 0.2 * tilt, tilt].into_iter().fold(LinearRows::new(), |walls, tilt: f64| {
+                let (sine, cosine) = tilt.sin_cos();
+                let tangents: [&[(usize, f64)]; 2] = [&[(0, 1.0)], &[(1, cosine), (2, -sine)]];
+                walls.unilateral(&[(1, sine), (2, cosine)], 0.0).friction(FRICTION, &tangents)
+            });
+            let mut run = run(block, (scheme.make)(), 0.01, vec![2.0, 0.0, 0.0])
+                .displacement(vec![START, 0.0, height])
+                .constraint(walls)
+                .build()
+                .unwrap();
+            // (In explicit schemes what has fallen bounces for a while.)
+            run.run_until(0.4, &mut ()).unwrap();
+            let (mut speed, step) = (run.state().velocity()[0], 0.01);
+            for _ in 0..20 {
+                run.step().unwrap();
+                let forces = run.state().contacts().forces();
+                let up: f64 =
+                    [-tilt, 0.2 * tilt, tilt].iter().zip(forces).map(|(tilt, force)| tilt.cos() * force).sum();
+                assert!(forces.iter().all(|force| *force > -1e-9 * weight), "{name}: {forces:?}");
+                assert!((up / weight - 1.0).abs() < SLACK, "{name}: {forces:?}");
+                let slows = (speed - run.state().velocity()[0]) / (step * FRICTION * GRAVITY);
+                assert!((1.0 - SLACK..1.0 / tilt.cos() + SLACK).contains(&slows), "{name}: {slows}");
+                speed = run.state().velocity()[0];
+            }
+        }
+    }
+}
+
 /// Below the angle of friction nothing moves, by not one bit, and friction holds the weight.
 #[test]
 fn below_the_angle_of_friction_nothing_creeps() {

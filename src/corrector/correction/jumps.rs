@@ -6,7 +6,7 @@ use super::{Correction, Jump, Pressed};
 use crate::contact::GapRates;
 use crate::contact_solver::AdmissibleSet;
 use crate::corrector::buffers::{Readings, Removal};
-use crate::corrector::jump_problem::{Block, JumpProblem};
+use crate::corrector::jump_problem::{Block, FrictionOf, JumpProblem};
 use crate::corrector::{Buffers, slides};
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -14,8 +14,8 @@ use crate::rounding::{ROUNDINGS_OF_STEP, rounding, share_of_rounding};
 
 impl<T: Real> Correction<'_, T> {
     /// Finds the engaged rows and the impulses that make the gap rates of the closed rows vanish (pressed rows) or
-    /// nonnegative (touching rows). Rows that close under a law with restitution get their rebound rates and are then
-    /// not engaged.
+    /// nonnegative (touching rows, and contacts with friction). Rows that close under a law with restitution get their
+    /// rebound rates and are then not engaged.
     ///
     /// # Errors
     ///
@@ -37,7 +37,8 @@ impl<T: Real> Correction<'_, T> {
         rows.engaged.clear();
         for block in &problem.blocks {
             let (row, totals) = (block.row, &problem.totals[block.places()]);
-            if block.set.is_bilateral() || totals[0] > T::zero() {
+            let is_pressed = block.tangents > 0 && pressed == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
+            if block.set.is_bilateral() || is_pressed || totals[0] > T::zero() {
                 rows.engaged.push(row);
             }
             if block.tangents > 0 {
@@ -56,7 +57,7 @@ impl<T: Real> Correction<'_, T> {
     }
 
     /// Finds the forces that make the gap accelerations of the engaged rows vanish (pressed rows) or nonnegative
-    /// (touching rows). A sliding contact keeps its direction.
+    /// (touching rows, and contacts with friction). A sliding contact keeps its direction.
     ///
     /// # Errors
     ///
@@ -102,9 +103,10 @@ impl<T: Real> Correction<'_, T> {
         let tangents = constraints.0.tangents();
         problem.clear();
         for &row in rows {
-            let held = pressed == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
-            let held = held || constraints.0.law(row).is_equality();
             let (own, friction) = (tangents.of(row), tangents.friction(row));
+            // A contact with friction is not held: where it pulled, it would have none (theory, section 18).
+            let is_held = own.is_empty() && pressed == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
+            let held = is_held || constraints.0.law(row).is_equality();
             let set = match (own.len(), held) {
                 (0, true) => AdmissibleSet::Free,
                 (0, false) => AdmissibleSet::NonNegative,
@@ -129,7 +131,7 @@ impl<T: Real> Correction<'_, T> {
     fn solve_posed(&mut self) -> Result<()> {
         let Self { buffers, contacts, g, projection, solver, new, .. } = self;
         let ids = &contacts.ids;
-        buffers.problem.solve((g, projection), &mut **solver, T::one(), (new.t, |row: usize| ids[row]))
+        buffers.problem.solve((g, projection), &mut **solver, FrictionOf::Pressing, (new.t, |row: usize| ids[row]))
     }
 
     /// The jump caused by the rounding of a gap in the scheme. Dependent rows may contradict each other by this much.

@@ -5,7 +5,7 @@ use super::{Correction, Past};
 use crate::contact_solver::AdmissibleSet;
 use crate::corrector::Buffers;
 use crate::corrector::buffers::Readings;
-use crate::corrector::jump_problem::Block;
+use crate::corrector::jump_problem::{Block, FrictionOf};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::rounding;
@@ -196,11 +196,13 @@ impl<T: Real> Correction<'_, T> {
                 problem.add_row(row, jump, rounding(g.magnitude(row, values) + jump.abs()), T::zero());
             }
         }
-        // A body that came from a positive gap has received a positive impulse: its past displacement is moved back
-        // accordingly.
-        let presses = if field == 0 { -T::one() } else { T::one() };
         let ids = &contacts.ids;
-        problem.solve((g, projection), &mut **solver, presses, (new.t, |row: usize| ids[tangents.owner(row)]))?;
+        problem.solve(
+            (g, projection),
+            &mut **solver,
+            FrictionOf::Changes,
+            (new.t, |row: usize| ids[tangents.owner(row)]),
+        )?;
         let changes = problem.jump.iter().zip(&problem.left).map(|(&jump, &left)| left - jump);
         Ok(problem.increments.iter().zip(changes).map(|(&multiplier, change)| multiplier * change).sum())
     }

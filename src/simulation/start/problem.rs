@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactId, ContactLaw, Course};
 use crate::contact_solver::AdmissibleSet;
-use crate::corrector::{Block, Gaps, JumpProblem, slides};
+use crate::corrector::{Block, FrictionOf, Gaps, JumpProblem, slides};
 use crate::error::Result;
 use crate::real::Real;
 use crate::rounding::{half_digits, rounding};
@@ -284,7 +284,7 @@ impl<T: Real> StartProblem<T> {
         }
         let Start { constraints, g, projection, contact_solver, .. } = start;
         contact_solver.reserve(problem.rows.len());
-        problem.solve((g, projection), &mut **contact_solver, T::one(), (t, |row| constraints.ids[row]))?;
+        problem.solve((g, projection), &mut **contact_solver, FrictionOf::Pressing, (t, |row| constraints.ids[row]))?;
         let is_unknown = |row: usize| self.known.iter().all(|(known, _)| *known != row);
         let unknown = problem.rows.iter().zip(&problem.totals).filter(|(row, _)| is_unknown(**row));
         (self.solved, self.lambda) = unknown.unzip();
@@ -322,7 +322,7 @@ impl<T: Real> StartProblem<T> {
         let tangents = constraints.tangents();
         contact_solver.reserve(problem.rows.len());
         let id = |row| constraints.ids[tangents.owner(row)];
-        if problem.solve((g, projection), &mut **contact_solver, T::one(), (motion.t, id)).is_err() {
+        if problem.solve((g, projection), &mut **contact_solver, FrictionOf::Pressing, (motion.t, id)).is_err() {
             return Ok(None);
         }
         let impulse = |row: usize| {

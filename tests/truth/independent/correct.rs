@@ -330,12 +330,13 @@ impl Step<'_> {
         let mut behind = rows.len();
         let mut contacts = Vec::new();
         for &i in rows {
+            let slides = jump == Jump::Acceleration && self.contacts.slides[i];
             let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
                 behind += 1;
-                let direction = (jump == Jump::Acceleration && self.contacts.slides[i]).then(|| self.directions[i]);
-                Friction { row: behind - 1, coefficient: *coefficient, direction }
+                let direction = slides.then(|| self.directions[i]);
+                Friction { row: behind - 1, coefficient: *coefficient, direction, of_change: false }
             });
-            let held = scene.rows[i].law == ContactLaw::Equality || held && self.is_pressed(i);
+            let held = scene.rows[i].law == ContactLaw::Equality || held && friction.is_none() && self.is_pressed(i);
             contacts.push(Contact { held, friction });
         }
         let problem = Problem { contacts, w, q, noise };
@@ -345,7 +346,8 @@ impl Step<'_> {
             self.engaged.clear();
             for (place, &i) in rows.iter().enumerate() {
                 // (Without friction what a touching row is given is all that it has.)
-                if problem.contacts[place].held || totals[place] > 0.0 {
+                let Contact { held: is_held, friction } = problem.contacts[place];
+                if is_held || held && friction.is_some() && self.is_pressed(i) || totals[place] > 0.0 {
                     self.engaged.push(i);
                 }
                 if let Some(Friction { row, coefficient, .. }) = problem.contacts[place].friction {
@@ -420,7 +422,7 @@ impl Step<'_> {
         let axes = self.axes_of(&rows);
         let (now, old) = (&self.past[0], &self.past[k]);
         let values = [&old.u, &old.v, &old.a][field];
-        let mut jumps: Vec<f64> = axes
+        let jumps: Vec<f64> = axes
             .iter()
             .map(|&axis| match scene.rows.get(axis) {
                 Some(row) => {
@@ -436,16 +438,13 @@ impl Step<'_> {
             .map(|(jump, &axis)| jump - self.outgoing(axis, field, k))
             .collect();
         let before = jumps.clone();
-        // An impulse that presses moves past displacements back: the problem of these has the other sign.
-        let sign = if field == 0 { -1.0 } else { 1.0 };
-        jumps.iter_mut().for_each(|jump| *jump *= sign);
         let mut behind = rows.len();
         let contact = |&i: &usize| {
             let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
                 behind += 1;
                 let slides = self.contacts.slides[i] && !self.leaving.contains(&i);
                 let direction = slides.then(|| self.directions[i]);
-                Friction { row: behind - 1, coefficient: *coefficient, direction }
+                Friction { row: behind - 1, coefficient: *coefficient, direction, of_change: true }
             });
             // (What sticks is held both ways, however it presses.)
             let stuck = friction.is_some_and(|friction| friction.direction.is_none());
@@ -469,7 +468,7 @@ impl Step<'_> {
         };
         let found = problem.solve();
         let mut multipliers = vec![0.0; axes.len()];
-        order.iter().zip(found).for_each(|(&place, m)| multipliers[place] = sign * m);
+        order.iter().zip(found).for_each(|(&place, m)| multipliers[place] = m);
         if field == 1 && !self.place.is_last && k == self.place.made {
             // What the state that the step starts from loses here no later stage sees any more.
             for (place, &i) in rows.iter().enumerate() {

@@ -19,6 +19,8 @@ pub(crate) struct Friction {
     pub(crate) coefficient: f64,
     /// The direction in which it is known to act.
     pub(crate) direction: Option<f64>,
+    /// Whether it is that of a change of forces, which may have either sign.
+    pub(crate) of_change: bool,
 }
 
 /// y = W r + q; rows of the contacts come first, those of tangents behind them.
@@ -66,7 +68,7 @@ impl Contact {
                     None => modes.extend([Mode::Stick, Mode::Slide(1.0), Mode::Slide(-1.0)]),
                     Some(direction) => modes.push(Mode::Slide(direction)),
                 }
-                if self.held {
+                if self.held && self.friction.is_some_and(|friction| !friction.of_change) {
                     // It pulls: there is no friction.
                     modes.push(Mode::Closed);
                 }
@@ -151,8 +153,10 @@ impl Problem {
                     ask((coefficient * r[i] - r[row].abs()) * self.w[row][row], row);
                 }
                 (Mode::Slide(direction), friction) => {
-                    let Some(Friction { row, direction: known, .. }) = friction else { continue };
-                    ask(way, i);
+                    let Some(Friction { row, direction: known, of_change, .. }) = friction else { continue };
+                    if !of_change {
+                        ask(way, i);
+                    }
                     if known.is_none() {
                         ask(-direction * y(row), row);
                     }

@@ -406,7 +406,7 @@ impl Stage<'_> {
         let contact = |&i: &usize| {
             let friction = rows[i].friction.as_ref().map(|(coefficient, _)| {
                 behind += 1;
-                Friction { row: behind - 1, coefficient: *coefficient, direction: None }
+                Friction { row: behind - 1, coefficient: *coefficient, direction: None, of_change: false }
             });
             Contact { held: rows[i].law == ContactLaw::Equality, friction }
         };

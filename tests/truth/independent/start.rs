@@ -217,7 +217,8 @@ fn rigid_forces(scene: &Scene, tableau: &Tableau, now: &Motion, gaps: &[f64]) ->
             // What slides at the start has its direction where accelerations are asked for.
             let speed = dot(tangent, &now.v);
             let slides = level.lead() <= 0.0 && speed.abs() > 64.0 * f64::EPSILON * size(tangent, &now.v);
-            Friction { row: behind - 1, coefficient: *coefficient, direction: slides.then(|| -speed.signum()) }
+            let direction = slides.then(|| -speed.signum());
+            Friction { row: behind - 1, coefficient: *coefficient, direction, of_change: false }
         });
         Contact { held: rows[i].law == ContactLaw::Equality, friction }
     });
