@@ -34,7 +34,7 @@ impl Units {
 }
 
 /// The depth of certificates, as a share of the smallest element.
-const CERTIFIED: f64 = 0.05;
+const CERTIFIED: f64 = 0.1;
 
 pub(super) struct Scene<const D: usize> {
     pub(super) nodes: Vec<[f64; D]>,
@@ -177,8 +177,7 @@ where
     pub(super) fn crossing(&self, u: &[f64]) -> Option<[usize; 2]> {
         let at = |(node, x): (usize, &[f64; D])| std::array::from_fn(|axis| x[axis] + u[D * node + axis]);
         let positions: Vec<[f64; D]> = self.nodes.iter().enumerate().map(at).collect();
-        // Corners are pulled by less than the distance of their facets: by 1/√3 of it in space.
-        crossing(&self.facets(&Variant::default()).concat(), &positions, 2.0 * CERTIFIED * self.element)
+        crossing(&self.facets(&Variant::default()).concat(), &positions, CERTIFIED * self.element)
     }
 
     fn surface_nodes(&self) -> Vec<usize> {
