@@ -1,7 +1,7 @@
 /* contact-dynamics for C and C++: time integration of finite-element models with unilateral contact.
  *
  * A model (cd_model) collects matrices, supports, loads and contacts; cd_build makes a run (cd_run) of it,
- * which takes steps. The page bindings/c/c.md of the repository has a first program and the limits.
+ * which takes steps. The page docs/c.md of the repository has a first program and the limits.
  *
  * Errors. Every function returns a status: CD_OK or the kind of the error, whose message is cd_last_error(). A
  * function that fails changes nothing, but cd_run_until keeps the steps before. Arguments that are NULL where a value
