@@ -62,17 +62,18 @@ fn refused<T>(entries: usize, what: &'static str) -> Error {
 #[derive(Default)]
 pub(crate) struct Scratch {
     buffer: Option<MemBuffer>,
-    bytes: usize,
+    /// What the buffer has room for.
+    room: Option<StackReq>,
 }
 
 impl Scratch {
-    /// Scratch of at least this size; allocates if there is less.
+    /// Scratch of at least this size and alignment; allocates if there is less.
     pub(crate) fn get(&mut self, required: StackReq) -> &mut MemBuffer {
-        let bytes = required.unaligned_bytes_required();
-        if bytes > self.bytes {
-            (self.buffer, self.bytes) = (None, bytes);
+        let room = self.room.map_or(required, |room| room.or(required));
+        if self.room != Some(room) {
+            (self.buffer, self.room) = (None, Some(room));
         }
-        self.buffer.get_or_insert_with(|| MemBuffer::new(required))
+        self.buffer.get_or_insert_with(|| MemBuffer::new(room))
     }
 }
 
@@ -84,13 +85,25 @@ impl Clone for Scratch {
 
 impl std::fmt::Debug for Scratch {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Scratch({} bytes)", self.bytes)
+        write!(f, "Scratch({} bytes)", self.room.map_or(0, |room| room.size_bytes()))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::dyn_stack::MemStack;
+
+    /// What one alignment leaves free another one may need.
+    #[test]
+    fn scratch_has_room_for_all_alignments() {
+        let mut scratch = Scratch::default();
+        for (bytes, alignment) in [(1024, 64), (1056, 8), (1000, 128)] {
+            let memory = scratch.get(StackReq::new_aligned::<u8>(bytes, alignment));
+            let (_, rest) = MemStack::new(memory).make_aligned_uninit::<u8>(bytes, alignment);
+            assert!(rest.len_bytes() < 1200);
+        }
+    }
 
     #[test]
     fn absurd_sizes_are_errors() {
