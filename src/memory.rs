@@ -62,7 +62,7 @@ fn refused<T>(entries: usize, what: &'static str) -> Error {
 #[derive(Default)]
 pub(crate) struct Scratch {
     buffer: Option<MemBuffer>,
-    /// What the buffer has room for.
+    /// Size and alignment of the buffer.
     room: Option<StackReq>,
 }
 

@@ -84,9 +84,9 @@ pub(crate) struct JumpProblem<T> {
 /// The normal multipliers of sliding contacts that come with friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FrictionOf {
-    /// Forces and impulses: those that press.
+    /// Those of forces and impulses, where they press.
     Pressing,
-    /// Changes of them: those of either sign.
+    /// Those of changes of forces and impulses, whether they press or pull.
     Changes,
 }
 
@@ -430,8 +430,8 @@ impl<T: Real> Group<T> {
         solver.solve(&ContactProblem::of(delassus, offset, sets, tolerance, 0), multipliers).map(|_| ())
     }
 
-    /// Solves equations. The friction of sliding contacts is that of the pass before, until it no longer changes. Each
-    /// pass has the least norm, so that dependent rows do not press and pull by arbitrary forces.
+    /// Solves equations by passes, each with the friction of the pass before, until the multipliers no longer change.
+    /// Each pass has the least norm, so that dependent rows do not press and pull by arbitrary forces.
     fn solve_equations(&mut self, of: FrictionOf) -> Solved<T> {
         /// Friction of a normal force changes that force by some tenths of its size at most, except near jamming.
         const PASSES: usize = 100;

@@ -66,7 +66,7 @@ fn a_block_comes_to_rest_and_stays() {
 }
 
 /// A gutter of three walls, more than a block in it needs: whatever the share of each, walls press and do not pull,
-/// their forces carry the block, and it slows down by no less than on a floor and no more than in a gutter of two walls.
+/// their forces carry the block, and it slows down at least as on a floor and at most as in a gutter of two walls.
 #[test]
 fn a_block_slides_in_a_gutter_of_more_walls_than_it_needs() {
     const FRICTION: f64 = 0.3;
@@ -88,7 +88,7 @@ fn a_block_slides_in_a_gutter_of_more_walls_than_it_needs() {
                 .constraint(walls)
                 .build()
                 .unwrap();
-            // (In explicit schemes what has fallen bounces for a while.)
+            // In explicit schemes a block that has fallen bounces for a while.
             run.run_until(0.4, &mut ()).unwrap();
             let (mut speed, step) = (run.state().velocity()[0], 0.01);
             for _ in 0..20 {

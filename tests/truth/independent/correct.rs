@@ -437,7 +437,6 @@ impl Step<'_> {
             .zip(&axes)
             .map(|(jump, &axis)| jump - self.outgoing(axis, field, k))
             .collect();
-        let before = jumps.clone();
         let mut behind = rows.len();
         let contact = |&i: &usize| {
             let friction = scene.rows[i].friction.as_ref().map(|(coefficient, _)| {
@@ -472,8 +471,8 @@ impl Step<'_> {
         if field == 1 && !self.place.is_last && k == self.place.made {
             // What the state that the step starts from loses here no later stage sees any more.
             for (place, &i) in rows.iter().enumerate() {
-                let after = before[place] + dot(&w[place], &multipliers);
-                let mean = 0.5 * (before[place] + after) + self.outgoing(i, field, k);
+                let after = jumps[place] + dot(&w[place], &multipliers);
+                let mean = 0.5 * (jumps[place] + after) + self.outgoing(i, field, k);
                 self.contacts.taken[i] -= multipliers[place] * mean;
             }
         }

@@ -19,7 +19,7 @@ pub(crate) struct Friction {
     pub(crate) coefficient: f64,
     /// The direction in which it is known to act.
     pub(crate) direction: Option<f64>,
-    /// Whether it is that of a change of forces, which may have either sign.
+    /// Whether it belongs to a change of forces, which may press or pull.
     pub(crate) of_change: bool,
 }
 

@@ -3,7 +3,7 @@
 use contact_dynamics::contact::Facet;
 use contact_dynamics_scenes::vectors::{along, cross, dot, minus, norm};
 
-/// Areas and volumes below this share of those of a scene's facets have no sign.
+/// The share of the size of two facets, squared in the plane and cubed in space, below which a turn is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Two facets without a common node that cross, if there are any, after the surface has been pulled into its body by
@@ -38,7 +38,7 @@ fn meets(facet: &Facet, against: &Facet, at: &[[f64; 3]], space: usize) -> bool 
     let mut sides = (0..nodes.len()).map(|k| [nodes[k], nodes[(k + 1) % nodes.len()]].map(|node| at[node]));
     let from = at[nodes[0]];
     let size = nodes.iter().chain(others).fold(0.0_f64, |most, &node| most.max(norm(minus(at[node], from))));
-    // Facets of one plane turn by what is rounding.
+    // For facets in one plane every turn is rounding.
     let sign = |turn: f64| if turn.abs() <= ROUNDING * size.powi(space as i32) { 0.0 } else { turn.signum() };
     if space == 2 {
         let [c, d] = [at[others[0]], at[others[1]]];
