@@ -21,7 +21,7 @@ pub(crate) use failure::{contact_error, no_response};
 pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
 pub use problem::{AdmissibleSet, ContactProblem};
-pub(crate) use projected_cg::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
+pub(crate) use projected_cg::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;

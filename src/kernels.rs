@@ -3,6 +3,7 @@
 
 pub(crate) mod chain;
 pub(crate) mod cholesky;
+pub(crate) mod coarse;
 pub(crate) mod conjugate_gradients;
 pub(crate) mod dense;
 pub(crate) mod elimination;

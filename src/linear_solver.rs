@@ -2,6 +2,7 @@
 
 mod by_body;
 mod cholesky;
+pub(crate) mod coarse_space;
 mod conjugate_gradients;
 mod diagonal;
 mod dissection;
@@ -118,7 +119,8 @@ pub trait Factorization<T: Real>: std::fmt::Debug + Send {
         false
     }
 
-    /// Iterations of the last solve, the largest number of its columns; zero for direct solvers.
+    /// Iterations of the last solve, the largest number of its columns and at least one; zero for direct solvers. Over
+    /// ranks the same number on all.
     fn iterations(&self) -> usize {
         0
     }

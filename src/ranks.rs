@@ -2,10 +2,12 @@
 
 mod agreement;
 mod check;
+mod conjugate_gradients;
 mod parts;
 mod solver;
 mod system;
 
+pub use conjugate_gradients::ConjugateGradientsOverRanks;
 pub use parts::parts;
 
 pub(crate) use agreement::Together;
@@ -34,7 +36,8 @@ use std::ops::Range;
 /// [`System::potential_energy`](crate::System::potential_energy) is the rank's part of the sum.
 ///
 /// **Linear solvers** must solve for the rows of all ranks ([`LinearSolver::spans_ranks`]); others are rejected,
-/// except for diagonal matrices. Their results on the interface must be bitwise the same on all ranks.
+/// except for diagonal matrices. Their results on the interface must be bitwise the same on all ranks, and their
+/// [iterations](crate::Factorization::iterations) the same number. [`ConjugateGradients::over_ranks`] is one.
 ///
 /// **Errors.** Before any operation that waits for other ranks, and at the end of each step, all ranks check that
 /// none has failed. If one has, the step fails on all and is undone: the failed rank returns its own error, the
@@ -51,6 +54,7 @@ use std::ops::Range;
 /// `docs/ranks.md` describes the cost of ranks.
 ///
 /// [`LinearSolver::spans_ranks`]: crate::LinearSolver::spans_ranks
+/// [`ConjugateGradients::over_ranks`]: crate::ConjugateGradients::over_ranks
 ///
 /// ```
 /// use contact_dynamics::ranks::Ranks;

@@ -7,7 +7,8 @@ mod stored;
 
 use crate::kernels::chain::{self, Chains};
 use crate::kernels::cholesky::{self, RightHandSide, Simplicial, Supernodal};
-use crate::kernels::conjugate_gradients::{self, Iteration, LANES, Outcome, Vectors};
+use crate::kernels::coarse::{self, NodeRows};
+use crate::kernels::conjugate_gradients::{self, Deflation, Iteration, LANES, Outcome, Vectors};
 use crate::kernels::forest::Forest;
 use crate::kernels::lu;
 use crate::kernels::product::{self, LowerColumns, Tridiagonal};
@@ -163,14 +164,21 @@ kernels! {
     ) -> Result<(), usize> = conjugate_gradients::scale_blocks;
     /// Solves with a scaled matrix in blocks of `size`².
     fn conjugate_gradients(
-        size: usize, iteration: &Iteration<'_, Self>, vectors: Vectors<'_, Self, 1>
+        size: usize,
+        iteration: &Iteration<'_, Self>,
+        deflation: Option<&mut dyn Deflation<Self>>,
+        vectors: Vectors<'_, Self, 1>,
     ) -> [Outcome; 1] = conjugate_gradients::solve_blocks;
+    /// `sums += Aᵀ x` for some rows of a matrix of nodes and aggregates.
+    fn gather_coarse(a: NodeRows<'_, Self>, rows: Range<usize>, x: &[Self], sums: &mut [Self]) = coarse::gather;
+    /// `x −= A weights` for some rows of a matrix of nodes and aggregates.
+    fn subtract_coarse(a: NodeRows<'_, Self>, rows: Range<usize>, weights: &[Self], x: &mut [Self]) = coarse::subtract;
     /// Scratch for factorizing a simplicial factor.
     fn cholesky_scratch(symbolic: &SymbolicCholesky<usize>) -> StackReq = cholesky::scratch::<Self>;
     /// Solves for several right-hand sides with a scaled matrix, given entry by entry.
     fn conjugate_gradients_side_by_side(
         iteration: &Iteration<'_, Self>, vectors: Vectors<'_, Self, LANES>
-    ) -> [Outcome; LANES] = conjugate_gradients::solve::<Self, 1, LANES>;
+    ) -> [Outcome; LANES] = conjugate_gradients::solve_side_by_side;
     /// Factorizes with partial pivoting; the error has the failing column in the elimination order.
     fn lu(
         symbolic: &SymbolicLu<usize>,

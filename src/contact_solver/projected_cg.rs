@@ -25,18 +25,43 @@ use crate::threads;
 use metric::Metric;
 use rows::Rows;
 use statuses::Statuses;
+use std::ops::Range;
 
 /// What memory is asked for.
 const WHAT: &str = "a contact problem without W";
 
-/// Writes A x to its last argument. x is zero farther from the dofs of the rows than its first argument, the number of
-/// products with which it can get there.
-type Product<'a, T> = &'a mut dyn FnMut(usize, &[T], &mut [T]);
+/// The body of a contact problem: its matrix A, symmetric and positive definite. Over ranks vectors are correct at every
+/// dof of a rank, and results are the same on all to the bit.
+pub(crate) trait Body<T> {
+    /// Writes A x to y. x is zero farther from the dofs of the rows than `reach`, the number of products with which it
+    /// can get there.
+    fn multiply(&mut self, reach: usize, x: &[T], y: &mut [T]) -> Result<()>;
+
+    /// The sum over all dofs, of which there are `dofs` on this rank, from the sums over ranges of them.
+    fn sum(&self, dofs: usize, part: &dyn Fn(Range<usize>) -> T) -> Result<T> {
+        Ok(part(0..dofs))
+    }
+
+    /// Solves in a coarse space that leaves the closed rows closed, if there is one: x += Z μ and r −= A Z μ, so that
+    /// Zᵀ r = 0.
+    fn start(&mut self, _r: &mut [T], _x: &mut [T]) -> Result<()> {
+        Ok(())
+    }
+
+    /// Keeps a direction A-orthogonal to that space: p −= Z μ, so that Zᵀ A p = 0.
+    fn turn(&mut self, _p: &mut [T]) -> Result<()> {
+        Ok(())
+    }
+
+    /// Fails on all ranks if one has failed.
+    fn agree(&self, result: Result<bool>) -> Result<bool> {
+        result
+    }
+}
 
 /// A contact problem given by A and G: y = G x + c λ + q with A x = Gᵀ λ.
 pub(crate) struct SparseProblem<'a, T> {
-    /// A is symmetric and positive definite.
-    pub(crate) product: Product<'a, T>,
+    pub(crate) body: &'a mut dyn Body<T>,
     /// D⁻¹ by dof: one over the diagonal of A, zero for dofs that do not move.
     pub(crate) inverse: &'a [T],
     pub(crate) data: RowData<'a, T>,
@@ -113,11 +138,13 @@ impl<T: Real> ProjectedCg<T> {
     /// Solves for the multipliers, which contain a guess of the closed rows without friction.
     pub(crate) fn solve(&mut self, problem: &mut SparseProblem<'_, T>, multipliers: &mut [T]) -> Result<Outcome> {
         let mut outcome = Outcome { products: 0, residual: 1.0, is_solved: false };
-        self.take(problem, multipliers)?;
+        let taken = self.take(problem, multipliers).map(|()| true);
+        problem.body.agree(taken)?;
         let mut scale = T::zero();
         while outcome.products < problem.patience.products && self.statuses.looks < problem.patience.looks {
             self.set_compliances();
-            if !self.metric.follow(&self.rows, &self.statuses, &self.inverse)? {
+            let is_factorized = self.metric.follow(&self.rows, &self.statuses, &self.inverse);
+            if !problem.body.agree(is_factorized)? {
                 break;
             }
             let miss = self.metric.close(&self.rows, &self.statuses, &self.inverse, &mut self.x);
@@ -129,7 +156,7 @@ impl<T: Real> ProjectedCg<T> {
                 outcome.residual = miss.share();
                 break;
             }
-            match self.iterate(problem, &mut scale, &mut outcome) {
+            match self.iterate(problem, &mut scale, &mut outcome)? {
                 End::OtherEquations => {}
                 End::GivenUp => break,
                 End::Solved => {
@@ -178,15 +205,15 @@ impl<T: Real> ProjectedCg<T> {
 
     /// Conjugate gradients with the present statuses, from a solution that closes the closed rows. `scale` is the size
     /// of the forces.
-    fn iterate(&mut self, problem: &mut SparseProblem<'_, T>, scale: &mut T, outcome: &mut Outcome) -> End {
-        self.balance(problem);
+    fn iterate(&mut self, problem: &mut SparseProblem<'_, T>, scale: &mut T, outcome: &mut Outcome) -> Result<End> {
+        self.balance(problem)?;
         outcome.products += 1;
         let (mut last, mut looked) = (None, None);
         *scale = scale.max(self.metric.norm(&self.statuses.multipliers));
         loop {
-            let square = weighted(&self.residual, &self.inverse);
+            let square = weighted(problem, &self.residual, &self.inverse)?;
             if !square.is_finite() {
-                return End::GivenUp;
+                return Ok(End::GivenUp);
             }
             let left = square.sqrt();
             let goal = T::of(problem.patience.residual) * *scale;
@@ -198,23 +225,23 @@ impl<T: Real> ProjectedCg<T> {
                 // Projections that are not exact leave closed rows a little open.
                 let mut is_closed = || self.metric.miss(&self.rows, &self.statuses, &self.x).is_met();
                 if changes || (left <= goal && !is_closed()) {
-                    return End::OtherEquations;
+                    return Ok(End::OtherEquations);
                 }
                 if left <= goal {
-                    return End::Solved;
+                    return Ok(End::Solved);
                 }
             }
-            if outcome.products == problem.patience.products || !self.descend(problem, square, &mut last) {
-                return End::GivenUp;
+            if outcome.products == problem.patience.products || !self.descend(problem, square, &mut last)? {
+                return Ok(End::GivenUp);
             }
             outcome.products += 1;
         }
     }
 
     /// Evaluates the residual Gᵀλ − A x, and projects it.
-    fn balance(&mut self, problem: &mut SparseProblem<'_, T>) {
+    fn balance(&mut self, problem: &mut SparseProblem<'_, T>) -> Result<()> {
         let Self { rows, metric, statuses, inverse, x, residual, reach, .. } = self;
-        multiply(problem, *reach, inverse, (x, residual));
+        multiply(problem, *reach, inverse, (x, residual))?;
         for r in residual.iter_mut() {
             *r = -*r;
         }
@@ -228,13 +255,15 @@ impl<T: Real> ProjectedCg<T> {
                 }
             }
         }
-        let size = weighted(residual, inverse).sqrt();
+        problem.body.start(&mut residual[..dofs], &mut x[..dofs])?;
+        let size = weighted(problem, residual, inverse)?.sqrt();
         metric.project(rows, statuses, inverse, (residual, size));
+        Ok(())
     }
 
     /// One step of conjugate gradients; `last` is the square of the residual in the last step. Returns whether the
     /// curvature is positive.
-    fn descend(&mut self, problem: &mut SparseProblem<'_, T>, square: T, last: &mut Option<T>) -> bool {
+    fn descend(&mut self, problem: &mut SparseProblem<'_, T>, square: T, last: &mut Option<T>) -> Result<bool> {
         let share = last.map_or(T::zero(), |last| square / last);
         *last = Some(square);
         let Self { rows, metric, statuses, inverse, x, residual, direction, product, reach, .. } = self;
@@ -244,9 +273,11 @@ impl<T: Real> ProjectedCg<T> {
             }
             T::zero()
         });
+        let dofs = problem.inverse.len();
+        problem.body.turn(&mut direction[..dofs])?;
         *reach += 1;
-        multiply(problem, *reach, inverse, (direction, product));
-        let curvature = threads::sum_pieces([], [direction, product], &|[], [p, product]| dot(p, product));
+        multiply(problem, *reach, inverse, (direction, product))?;
+        let curvature = total(problem, [direction, product], &|[p, product]| dot(p, product))?;
         let sound = curvature > T::zero();
         if sound {
             let length = square / curvature;
@@ -257,7 +288,7 @@ impl<T: Real> ProjectedCg<T> {
             });
             metric.project(rows, statuses, inverse, (residual, square.sqrt()));
         }
-        sound
+        Ok(sound)
     }
 }
 
@@ -270,19 +301,38 @@ enum End {
 }
 
 /// `y = A x`. A compliant row has the stiffness 1/c.
-fn multiply<T: Real>(problem: &mut SparseProblem<'_, T>, reach: usize, inverse: &[T], (x, y): (&[T], &mut [T])) {
+fn multiply<T: Real>(
+    problem: &mut SparseProblem<'_, T>,
+    reach: usize,
+    inverse: &[T],
+    (x, y): (&[T], &mut [T]),
+) -> Result<()> {
     let dofs = problem.inverse.len();
-    (problem.product)(reach, &x[..dofs], &mut y[..dofs]);
+    problem.body.multiply(reach, &x[..dofs], &mut y[..dofs])?;
     for ((y, &x), &c) in y[dofs..].iter_mut().zip(&x[dofs..]).zip(&inverse[dofs..]) {
         *y = if c > T::zero() { x / c } else { T::zero() };
     }
+    Ok(())
 }
 
 /// rᵀ D⁻¹ r.
-fn weighted<T: Real>(r: &[T], inverse: &[T]) -> T {
-    threads::sum_pieces([], [r, inverse], &|[], [r, inverse]| {
-        r.iter().zip(inverse).map(|(&r, &inverse)| inverse * r * r).sum()
-    })
+fn weighted<T: Real>(problem: &SparseProblem<'_, T>, r: &[T], inverse: &[T]) -> Result<T> {
+    let square = |[r, inverse]: [&[T]; 2]| r.iter().zip(inverse).map(|(&r, &inverse)| inverse * r * r).sum();
+    total(problem, [r, inverse], &square)
+}
+
+/// A sum over the dofs of all ranks and over the compliant rows, which all ranks have.
+fn total<T: Real>(
+    problem: &SparseProblem<'_, T>,
+    vectors: [&[T]; 2],
+    sum: &(impl Fn([&[T]; 2]) -> T + Sync),
+) -> Result<T> {
+    let part = |range: Range<usize>| {
+        let pieces = vectors.map(|vector| &vector[range.clone()]);
+        threads::sum_pieces([], pieces, &|[], pieces| sum(pieces))
+    };
+    let dofs = problem.inverse.len();
+    Ok(problem.body.sum(dofs, &part)? + part(dofs..vectors[0].len()))
 }
 
 /// A ratio of sizes; zero if there is nothing to compare with.

@@ -1,19 +1,21 @@
 //! Jump problems of hundreds of rows that S couples, as of a mortar: S is sparse, and neither formed densely nor
-//! factorized so.
+//! factorized so. Only the dofs of the rows move; they are numbered as the rows list them, which is the same on all
+//! ranks.
 
 use super::JumpProjection;
 use super::jump_problem::{FrictionOf, JumpProblem};
 use crate::contact::ContactJacobian;
-use crate::contact_solver::{AdmissibleSet, Patience, ProjectedCg, RowData, SparseProblem};
+use crate::contact_solver::{AdmissibleSet, Body, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
 use crate::memory;
 use crate::real::Real;
 use crate::rounding::{projected_residual, rounding};
 
-/// Memory for one group, with one entry per row or block.
+/// Memory for one group.
 #[derive(Debug, Default)]
 pub(super) struct ManyJumps<T> {
     cg: ProjectedCg<T>,
+    moved: MovedDofs<T>,
     rows: Vec<usize>,
     compliance: Vec<T>,
     offset: Vec<T>,
@@ -21,8 +23,19 @@ pub(super) struct ManyJumps<T> {
     sets: Vec<AdmissibleSet>,
     along: Vec<Option<[T; 2]>>,
     multipliers: Vec<T>,
+}
+
+/// The dofs that the rows of a group act on.
+#[derive(Debug, Default)]
+struct MovedDofs<T> {
+    /// The rows, with these dofs.
+    g: ContactJacobian<T>,
+    dofs: Vec<usize>,
+    /// For each dof of the system its number among these, from one on.
+    numbers: Vec<usize>,
+    inverse: Vec<T>,
     /// Changes of the dofs by the multipliers, and the sums of their magnitudes.
-    moved: Vec<T>,
+    change: Vec<T>,
     sizes: Vec<T>,
 }
 
@@ -49,8 +62,9 @@ impl<T: Real> JumpProblem<T> {
             return Ok(false);
         }
         let mut many = self.many.take().unwrap_or_default();
+        many.moved.read((g, inverse), positions.iter().map(|&position| self.rows[position]))?;
         loop {
-            if !many.solve(self, g, (positions, inverse))? {
+            if !many.solve(self, positions)? {
                 self.many = Some(many);
                 return Ok(false);
             }
@@ -62,44 +76,101 @@ impl<T: Real> JumpProblem<T> {
             }
         }
         self.keep_in_cones(positions);
-        many.measure(self, g, (positions, inverse));
+        many.measure(self, positions);
         self.many = Some(many);
         Ok(true)
     }
 }
 
+impl<T: Real> MovedDofs<T> {
+    /// Numbers the dofs of some rows.
+    fn read(
+        &mut self,
+        (g, inverse): (&ContactJacobian<T>, &[T]),
+        rows: impl Iterator<Item = usize> + Clone,
+    ) -> Result<()> {
+        let Self { g: own, dofs, numbers, inverse: of_own, change, sizes } = self;
+        for dof in dofs.drain(..) {
+            numbers[dof] = 0;
+        }
+        memory::grow(numbers, inverse.len(), 1, WHAT)?;
+        let entries = rows.clone().map(|row| g.row(row).count()).sum();
+        own.begin(rows.clone().count(), entries)?;
+        memory::make_room(dofs, entries.min(inverse.len()), WHAT)?;
+        for row in rows {
+            own.push_entries(g.row(row).map(|(dof, weight)| {
+                if numbers[dof] == 0 {
+                    dofs.push(dof);
+                    numbers[dof] = dofs.len();
+                }
+                (numbers[dof] - 1, weight)
+            }));
+        }
+        of_own.clear();
+        memory::make_room(of_own, dofs.len(), WHAT)?;
+        of_own.extend(dofs.iter().map(|&dof| inverse[dof]));
+        for values in [change, sizes] {
+            memory::grow(values, dofs.len(), 1, WHAT)?;
+        }
+        Ok(())
+    }
+
+    /// M⁻¹ Gᵀ m of multipliers m, and M⁻¹ |G|ᵀ s of their sizes s, given for each row.
+    fn set(&mut self, multipliers: impl Iterator<Item = [T; 2]>) {
+        let Self { g, inverse, change, sizes, .. } = self;
+        for values in [&mut *change, sizes] {
+            values.fill(T::zero());
+        }
+        for (row, [multiplier, size]) in multipliers.enumerate() {
+            for (dof, weight) in g.row(row) {
+                change[dof] += inverse[dof] * (weight * multiplier);
+                sizes[dof] += inverse[dof] * (weight.abs() * size);
+            }
+        }
+    }
+
+    /// The change of a row, and the rounding of it.
+    fn of_row(&self, row: usize) -> [T; 2] {
+        [self.g.product(row, &self.change), rounding(self.g.magnitude(row, &self.sizes))]
+    }
+}
+
+/// M, which is lumped, from its inverse.
+struct LumpedMass<'a, T>(&'a [T]);
+
+impl<T: Real> Body<T> for LumpedMass<'_, T> {
+    fn multiply(&mut self, _: usize, x: &[T], y: &mut [T]) -> Result<()> {
+        for ((y, &x), &inverse) in y.iter_mut().zip(x).zip(self.0) {
+            *y = if inverse > T::zero() { x / inverse } else { T::zero() };
+        }
+        Ok(())
+    }
+}
+
 impl<T: Real> ManyJumps<T> {
     /// Solves for the rows at these positions. Returns whether all values are finite, and the iteration converges.
-    fn solve(
-        &mut self,
-        all: &JumpProblem<T>,
-        g: &ContactJacobian<T>,
-        (positions, inverse): (&[usize], &[T]),
-    ) -> Result<bool> {
-        let Self { rows, compliance, offset, tolerance, sets, along, multipliers, moved, sizes, .. } = self;
+    fn solve(&mut self, all: &JumpProblem<T>, positions: &[usize]) -> Result<bool> {
+        let Self { cg, moved, rows, compliance, offset, tolerance, sets, along, multipliers } = self;
         let size = positions.len();
         for values in [&mut *compliance, offset, tolerance, multipliers] {
             values.clear();
             memory::grow(values, size, 1, WHAT)?;
         }
-        for values in [&mut *moved, sizes] {
-            memory::grow(values, inverse.len(), 1, WHAT)?;
-        }
         rows.clear();
         memory::make_room(rows, size, WHAT)?;
+        rows.extend(0..size);
         sets.clear();
         memory::make_room(sets, size, WHAT)?;
         along.clear();
         memory::make_room(along, size, WHAT)?;
-        self.move_dofs(g, (&all.rows, positions), inverse, |position| [all.base[position], all.base[position].abs()]);
-        let Self { cg, rows, compliance, offset, tolerance, sets, along, multipliers, moved, sizes } = self;
-        for (k, &position) in positions.iter().enumerate() {
-            let (row, block) = (all.rows[position], &all.blocks[all.owners[position]]);
-            rows.push(row);
-            offset[k] = all.jump[position] - g.product(row, moved);
-            tolerance[k] = all.tolerance[position] + rounding(g.magnitude(row, sizes));
+        moved.set(positions.iter().map(|&position| [all.base[position], all.base[position].abs()]));
+        for (row, &position) in positions.iter().enumerate() {
+            let block = &all.blocks[all.owners[position]];
+            let [change, noise] = moved.of_row(row);
+            offset[row] = all.jump[position] - change;
+            tolerance[row] = all.tolerance[position] + noise;
             if block.place == position {
-                compliance[k] = block.compliance;
+                compliance[row] = block.compliance;
                 sets.push(block.set);
                 along.push(block.direction);
             }
@@ -107,49 +178,24 @@ impl<T: Real> ManyJumps<T> {
         if !T::all_finite(offset) || !T::all_finite(compliance) {
             return Ok(false);
         }
-        let mut product = |_: usize, x: &[T], y: &mut [T]| {
-            for ((y, &x), &inverse) in y.iter_mut().zip(x).zip(inverse) {
-                *y = if inverse > T::zero() { x / inverse } else { T::zero() };
-            }
-        };
-        let data = RowData { g, rows, compliance, offset, tolerance, sets, along };
+        let data = RowData { g: &moved.g, rows, compliance, offset, tolerance, sets, along };
         let patience = Patience { products: 2 * LOOKS, looks: LOOKS, residual: projected_residual::<T>().value() };
         cg.begin();
-        let outcome = cg.solve(&mut SparseProblem { product: &mut product, inverse, data, patience }, multipliers)?;
-        Ok(outcome.is_solved)
+        let mut mass = LumpedMass(&moved.inverse);
+        let mut problem = SparseProblem { body: &mut mass, inverse: &moved.inverse, data, patience };
+        Ok(cg.solve(&mut problem, multipliers)?.is_solved)
     }
 
     /// Computes the remaining jumps.
-    fn measure(&mut self, all: &mut JumpProblem<T>, g: &ContactJacobian<T>, (positions, inverse): (&[usize], &[T])) {
-        self.move_dofs(g, (&all.rows, positions), inverse, |position| {
+    fn measure(&mut self, all: &mut JumpProblem<T>, positions: &[usize]) {
+        self.moved.set(positions.iter().map(|&position| {
             let [total, base] = [all.totals[position], all.base[position]];
             [total - base, total.abs() + base.abs()]
-        });
-        for &position in positions {
-            let row = all.rows[position];
-            all.left[position] = all.jump[position] + g.product(row, &self.moved);
-            all.noise[position] = all.tolerance[position] + rounding(g.magnitude(row, &self.sizes));
-        }
-    }
-
-    /// M⁻¹ Gᵀ m of multipliers m, and M⁻¹ |G|ᵀ s of their sizes s.
-    fn move_dofs(
-        &mut self,
-        g: &ContactJacobian<T>,
-        (rows, positions): (&[usize], &[usize]),
-        inverse: &[T],
-        multiplier: impl Fn(usize) -> [T; 2],
-    ) {
-        let Self { moved, sizes, .. } = self;
-        for values in [&mut *moved, sizes] {
-            values.fill(T::zero());
-        }
-        for &position in positions {
-            let [multiplier, size] = multiplier(position);
-            for (dof, weight) in g.row(rows[position]) {
-                moved[dof] += inverse[dof] * (weight * multiplier);
-                sizes[dof] += inverse[dof] * (weight.abs() * size);
-            }
+        }));
+        for (row, &position) in positions.iter().enumerate() {
+            let [change, noise] = self.moved.of_row(row);
+            all.left[position] = all.jump[position] + change;
+            all.noise[position] = all.tolerance[position] + noise;
         }
     }
 }

@@ -36,6 +36,16 @@ pub struct Iteration<'a, T> {
     pub limit: usize,
 }
 
+/// A space Z in which a solve begins, and that its directions are kept out of. It may fail: then an iteration ends
+/// without result.
+pub trait Deflation<T> {
+    /// Solves in the space: x += Z μ and r −= A Z μ, so that Zᵀ r = 0. Returns μᵀ Zᵀ A Z μ.
+    fn start(&mut self, r: &mut [T], x: &mut [T]) -> f64;
+
+    /// t −= Z μ and p −= (1 + Lᵀ) Z μ, so that Zᵀ A t = 0.
+    fn turn(&mut self, t: &mut [T], p: &mut [T]);
+}
+
 /// One entry of each of W right-hand sides.
 pub(crate) type Lanes<T, const W: usize> = [T; W];
 
@@ -179,13 +189,23 @@ pub(crate) fn scale_blocks<T: Scalar>(
 pub(crate) fn solve_blocks<T: Scalar>(
     size: usize,
     iteration: &Iteration<'_, T>,
+    deflation: Option<&mut dyn Deflation<T>>,
     vectors: Vectors<'_, T, 1>,
 ) -> [Outcome; 1] {
     match size {
-        3 => solve::<T, 3, 1>(iteration, vectors),
-        2 => solve::<T, 2, 1>(iteration, vectors),
-        _ => solve::<T, 1, 1>(iteration, vectors),
+        3 => solve_lanes::<T, 3, 1>(iteration, deflation, vectors),
+        2 => solve_lanes::<T, 2, 1>(iteration, deflation, vectors),
+        _ => solve_lanes::<T, 1, 1>(iteration, deflation, vectors),
     }
+}
+
+/// As [`solve_lanes`], for several right-hand sides of a matrix given entry by entry.
+#[inline]
+pub(crate) fn solve_side_by_side<T: Scalar>(
+    iteration: &Iteration<'_, T>,
+    vectors: Vectors<'_, T, LANES>,
+) -> [Outcome; LANES] {
+    Arch::new().dispatch(SideBySide { iteration, vectors })
 }
 
 /// Scales a matrix: `values` and `diagonal` hold its blocks and are replaced by C_I⁻¹ A_IJ C_J⁻ᵀ and C_I⁻¹, with the
@@ -249,35 +269,25 @@ impl Ends {
     }
 }
 
-/// Solves A x = r for each right-hand side r, starting from zero.
-#[inline]
-pub(crate) fn solve<T: Scalar, const B: usize, const W: usize>(
-    iteration: &Iteration<'_, T>,
-    vectors: Vectors<'_, T, W>,
-) -> [Outcome; W] {
-    match W {
-        1 => solve_lanes::<T, B, W>(iteration, vectors),
-        _ => Arch::new().dispatch(Solve::<T, B, W> { iteration, vectors }),
-    }
-}
-
-struct Solve<'a, T, const B: usize, const W: usize> {
+struct SideBySide<'a, T> {
     iteration: &'a Iteration<'a, T>,
-    vectors: Vectors<'a, T, W>,
+    vectors: Vectors<'a, T, LANES>,
 }
 
-impl<T: Scalar, const B: usize, const W: usize> WithSimd for Solve<'_, T, B, W> {
-    type Output = [Outcome; W];
+impl<T: Scalar> WithSimd for SideBySide<'_, T> {
+    type Output = [Outcome; LANES];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [Outcome; W] {
-        solve_lanes::<T, B, W>(self.iteration, self.vectors)
+    fn with_simd<S: Simd>(self, _: S) -> [Outcome; LANES] {
+        solve_lanes::<T, 1, LANES>(self.iteration, None, self.vectors)
     }
 }
 
+/// Solves A x = r for each right-hand side r, starting from zero or in a space to be deflated.
 #[inline(always)]
 fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
     iteration: &Iteration<'_, T>,
+    deflation: Option<&mut dyn Deflation<T>>,
     mut vectors: Vectors<'_, T, W>,
 ) -> [Outcome; W] {
     let Iteration { lower, scaling, parts, tolerance, resolution, limit } = *iteration;
@@ -301,7 +311,7 @@ fn solve_lanes<T: Scalar, const B: usize, const W: usize>(
     }
     let ends = Ends { tolerance, resolution: resolution * resolution, limit, first: 0.0, length: 0.0, iterations: 0 };
     let mut ends = [ends; W];
-    let mut outcomes = iterate::<T, B, W>(&Sweeps { lower, parts }, &mut ends, vectors.lend());
+    let mut outcomes = iterate::<T, B, W>(&Sweeps { lower, parts }, deflation, &mut ends, vectors.lend());
     let x = vectors.x;
     let mut lengths = [0.0; W];
     for x in &*x {
@@ -397,31 +407,66 @@ fn each_of<T: Scalar, const B: usize, const W: usize>(
 /// With the preconditioner (1 + L)(1 + Lᵀ), in a form in which a step costs only one product (Eisenstat, 1981): in
 /// the variables (1 + Lᵀ) x the product with a direction p is t + (1 + L)⁻¹ (p − t), where t = (1 + Lᵀ)⁻¹ p.
 /// A right-hand side whose iteration has ended waits for the others, with steps of zero.
+///
+/// With a deflation t is (1 + Lᵀ)⁻¹ p too, found from (1 + Lᵀ)⁻¹ r, without what both have of the space.
 #[inline(always)]
 fn iterate<T: Scalar, const B: usize, const W: usize>(
     sweeps: &Sweeps<'_, T>,
+    mut deflation: Option<&mut dyn Deflation<T>>,
     ends: &mut [Ends; W],
     mut vectors: Vectors<'_, T, W>,
 ) -> [Outcome; W] {
     let (lower, border) = (&sweeps.lower, sweeps.border());
     let behind = border.range.start * B;
     vectors.x.fill([T::zero(); W]);
+    if let Some(deflation) = &mut deflation {
+        // The size of the right-hand side as it is without the deflation.
+        vectors.t.copy_from_slice(vectors.r);
+        let mut first = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| eliminate::<T, B, W>(lower, rows, own.t));
+        add(&mut first, eliminate::<T, B, W>(lower, border.clone(), vectors.t));
+        let length = deflation.start(vectors.r.as_flattened_mut(), vectors.x.as_flattened_mut());
+        for l in 0..W {
+            (ends[l].first, ends[l].length) = (first[l], length);
+        }
+        vectors.t.fill([T::zero(); W]);
+    }
     let mut rho = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| eliminate::<T, B, W>(lower, rows, own.r));
     add(&mut rho, eliminate::<T, B, W>(lower, border.clone(), vectors.r));
-    for l in 0..W {
-        ends[l].first = rho[l];
+    if deflation.is_none() {
+        for l in 0..W {
+            ends[l].first = rho[l];
+        }
     }
     let mut beta = [T::zero(); W];
     vectors.p.fill([T::zero(); W]);
-    let mut outcomes = rho.map(|rho| (rho == 0.0).then_some(Outcome::Converged { iterations: 0 }));
+    let is_met = |l: usize| rho[l] <= ends[l].tolerance.powi(2) * ends[l].first;
+    let mut outcomes: [Option<Outcome>; W] =
+        std::array::from_fn(|l| is_met(l).then_some(Outcome::Converged { iterations: 0 }));
     while outcomes.iter().any(Option::is_none) {
-        sweeps.each_part::<B, W>(vectors.lend(), |_, own| turn(beta, own));
-        turn(beta, vectors.lend().split_at(behind)[1].lend());
-        substitute_back::<T, B, W>(lower, border.clone(), vectors.t);
-        let mut curvature = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| {
-            substitute_back::<T, B, W>(lower, rows.clone(), own.t);
-            substitute::<T, B, W>(lower, rows, [own.p, own.t], own.y)
-        });
+        let mut curvature = match &mut deflation {
+            None => {
+                sweeps.each_part::<B, W>(vectors.lend(), |_, own| turn(beta, own));
+                turn(beta, vectors.lend().split_at(behind)[1].lend());
+                substitute_back::<T, B, W>(lower, border.clone(), vectors.t);
+                sweeps.each_part::<B, W>(vectors.lend(), |rows, own| {
+                    substitute_back::<T, B, W>(lower, rows.clone(), own.t);
+                    substitute::<T, B, W>(lower, rows, [own.p, own.t], own.y)
+                })
+            }
+            Some(deflation) => {
+                vectors.y.copy_from_slice(vectors.r);
+                substitute_back::<T, B, W>(lower, border.clone(), vectors.y);
+                sweeps.each_part::<B, W>(vectors.lend(), |rows, own| {
+                    substitute_back::<T, B, W>(lower, rows, own.y);
+                    turn_both(beta, own)
+                });
+                turn_both(beta, vectors.lend().split_at(behind)[1].lend());
+                deflation.turn(vectors.t.as_flattened_mut(), vectors.p.as_flattened_mut());
+                sweeps.each_part::<B, W>(vectors.lend(), |rows, own| {
+                    substitute::<T, B, W>(lower, rows, [own.p, own.t], own.y)
+                })
+            }
+        };
         let known = [&*vectors.p, &*vectors.t];
         add(&mut curvature, substitute::<T, B, W>(lower, border.clone(), known, vectors.y));
         let mut steps = [0.0; W];
@@ -486,6 +531,21 @@ fn turn<T: Scalar, const W: usize>(beta: Lanes<T, W>, Vectors { r, p, t, .. }: V
     for ((p, t), r) in p.iter_mut().zip(t).zip(&*r) {
         *p = std::array::from_fn(|l| r[l] + beta[l] * p[l]);
         *t = *p;
+    }
+    [0.0; W]
+}
+
+/// The next direction p, and t without another substitution: y is (1 + Lᵀ)⁻¹ r.
+#[inline(always)]
+fn turn_both<T: Scalar, const W: usize>(
+    beta: Lanes<T, W>,
+    Vectors { r, p, t, y, .. }: Vectors<'_, T, W>,
+) -> Lanes<f64, W> {
+    for (((p, t), r), y) in p.iter_mut().zip(t).zip(&*r).zip(&*y) {
+        for l in 0..W {
+            p[l] = r[l] + beta[l] * p[l];
+            t[l] = y[l] + beta[l] * t[l];
+        }
     }
     [0.0; W]
 }

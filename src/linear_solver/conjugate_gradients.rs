@@ -1,13 +1,16 @@
 //! Preconditioned conjugate gradients: large bodies at small steps.
 
+mod deflation;
 mod parts;
 
+use super::coarse_space;
 use super::{Factorization, Fingerprint, LinearSolver, check_analysis};
 use crate::error::{Error, Result};
-use crate::kernels::conjugate_gradients::{Blocks, Iteration, Outcome, Vectors};
+use crate::kernels::conjugate_gradients::{self, Blocks, Iteration, Outcome, Vectors};
 use crate::memory;
 use crate::real::Real;
 use crate::sparse;
+use deflation::{Deflation, Places};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use parts::Parts;
 use std::ops::Range;
@@ -102,6 +105,11 @@ impl ConjugateGradients {
     pub fn iterations(self, iterations: usize) -> Self {
         Self { iterations, ..self }
     }
+
+    /// The values of [`tolerance`](Self::tolerance) and [`iterations`](Self::iterations).
+    pub(crate) fn limits(self) -> (f64, usize) {
+        (self.tolerance, self.iterations)
+    }
 }
 
 /// A scaled matrix in blocks, and memory for the iteration.
@@ -119,6 +127,9 @@ struct Matrix<T: Real> {
     values: Vec<T>,
     /// C⁻¹ of the diagonal blocks C Cᵀ.
     scaling: Vec<T>,
+    /// The coarse space, if there is one, and what it needs of the pattern.
+    deflation: Option<Deflation<T>>,
+    places: Option<Places>,
     /// Five vectors.
     vectors: Vec<T>,
     /// Memory of the check of symmetry.
@@ -211,6 +222,8 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
             columns,
             values,
             scaling,
+            deflation: None,
+            places: None,
             vectors: memory::zeros(dofs, 5, "the vectors of conjugate gradients")?,
             cursor: Vec::with_capacity(dofs),
             state: Ready::No,
@@ -220,18 +233,24 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
 }
 
 impl<T: Real> Matrix<T> {
-    /// Copies the entries of a symmetric matrix.
-    fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    /// Copies the entries of a symmetric matrix. Returns an estimate of the condition number of the scaled matrix: the
+    /// stiffest motion has twice the sum of the diagonal, a translation the sum of all entries.
+    fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<f64> {
         let Self { size, parts, pointers, columns, values, scaling, .. } = self;
         let size = *size;
         values.fill(T::zero());
         scaling.fill(T::zero());
+        let (mut diagonal, mut all) = (T::zero(), T::zero());
         for dof in 0..a.ncols() {
             let (row, place) = (parts.place(dof / size), dof % size);
             let own: Range<usize> = pointers[row]..pointers[row + 1];
             let mut at = own.start;
             for (&other, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
                 let (column, within) = (parts.place(other / size), other % size);
+                if within == place {
+                    all += value;
+                    diagonal += if other == dof { value } else { T::zero() };
+                }
                 if column >= row {
                     if column == row {
                         scaling[(row * size + within) * size + place] = value;
@@ -253,7 +272,7 @@ impl<T: Real> Matrix<T> {
                 at += usize::from(within + 1 == size);
             }
         }
-        Ok(())
+        Ok((T::of(2.0) * diagonal / all).value())
     }
 }
 
@@ -262,15 +281,19 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         self.state = Ready::No;
         self.fingerprint.check(a)?;
         sparse::check_symmetric_in("effective", a, &mut self.cursor)?;
-        self.fill(a)?;
+        let condition = self.fill(a)?;
         T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)
             .map_err(|dof| Error::Singular { matrix: "effective matrix", dof: self.parts.dof(dof, self.size) })?;
+        match condition > coarse_space::WORTHWHILE {
+            true => self.deflate(a)?,
+            false => self.deflation = None,
+        }
         self.state = Ready::Yes;
         Ok(())
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { settings, dofs, size, parts, pointers, columns, values, scaling, vectors, .. } = self;
+        let Self { settings, dofs, size, parts, pointers, columns, values, scaling, deflation, vectors, .. } = self;
         if self.state == Ready::No {
             let part = "conjugate gradients".into();
             return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
@@ -282,12 +305,17 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         let (tolerance, limit) = (settings.tolerance, settings.iterations);
         let resolution = T::epsilon().value();
         let iteration = Iteration { lower, scaling, parts: &parts.ends, tolerance, resolution, limit };
-        self.iterations = 0;
+        // At least one, by which contact knows that solves iterate.
+        self.iterations = 1;
         for column in rhs.chunks_exact_mut(*dofs) {
             for (row, values) in column.chunks_exact(*size).enumerate() {
                 vectors[*dofs + parts.place(row) * *size..][..*size].copy_from_slice(values);
             }
-            let [outcome] = T::conjugate_gradients(*size, &iteration, Vectors::of(vectors, *dofs));
+            let space = deflation.as_mut().map(|space| -> &mut dyn conjugate_gradients::Deflation<T> { space });
+            let [outcome] = T::conjugate_gradients(*size, &iteration, space, Vectors::of(vectors, *dofs));
+            if let Some(error) = deflation.as_mut().and_then(Deflation::failure) {
+                return Err(error);
+            }
             for (row, values) in column.chunks_exact_mut(*size).enumerate() {
                 values.copy_from_slice(&vectors[parts.place(row) * *size..][..*size]);
             }
@@ -311,7 +339,8 @@ impl<T: Real> Factorization<T> for Matrix<T> {
     }
 
     fn stored_values(&self) -> usize {
-        [&self.values, &self.scaling, &self.vectors].iter().map(|part| part.len()).sum()
+        let of_space = self.deflation.as_ref().map_or(0, Deflation::stored_values);
+        of_space + [&self.values, &self.scaling, &self.vectors].iter().map(|part| part.len()).sum::<usize>()
     }
 
     fn iterations(&self) -> usize {

@@ -19,6 +19,7 @@ use crate::contact_solver::{Assembly, FORESEEN, Outcome, RowData};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::memory;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::rounding::largest_compliance;
 use crate::simulation::operator::contact_path::{ContactPath, analyze, condensation, respond};
@@ -48,8 +49,6 @@ pub(crate) struct Operator<T> {
     products: Option<Box<Products<T>>>,
     groups: Groups,
     contact: ContactPath,
-    /// Whether this rank has all rows of the matrix.
-    whole: bool,
     /// Columns of the system's size, for full solves.
     full: Vec<T>,
 }
@@ -103,7 +102,6 @@ impl<T: Real> Operator<T> {
             products: None,
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact,
-            whole: system.ranks().is_none(),
             full,
         };
         match operator.factorize(system, h, at) {
@@ -134,7 +132,6 @@ impl<T: Real> Operator<T> {
             products: None,
             groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
             contact: ContactPath::Condensed,
-            whole: true,
             full: Vec::new(),
         })
     }
@@ -339,7 +336,7 @@ impl<T: Real> Operator<T> {
 
     /// Whether problems of so many rows may be solved by products with A.
     pub(crate) fn multiplies(&self, assembly: Assembly, rows: usize) -> bool {
-        let may = self.contact != ContactPath::Apart && self.whole && self.factor.is_symmetric();
+        let may = self.contact != ContactPath::Apart && self.factor.is_symmetric();
         let few = assembly == Assembly::Automatic && self.iterates();
         may && rows >= if few { 1 } else { assembly.least() }
     }
@@ -353,7 +350,8 @@ impl<T: Real> Operator<T> {
     /// the forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
     pub(crate) fn solve_by_products(
         &mut self,
-        (system, h, at): (&mut dyn System<T>, f64, At<'_, T>),
+        (system, together): (&mut dyn System<T>, &Together<T>),
+        (h, at): (f64, At<'_, T>),
         (assembly, residual): (Assembly, f64),
         data: RowData<'_, T>,
         multipliers: &mut [T],
@@ -364,7 +362,7 @@ impl<T: Real> Operator<T> {
         if data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
             return Ok(None);
         }
-        self.read_products(system, h, at)?;
+        self.read_products((system, together), h, at)?;
         let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
@@ -377,7 +375,14 @@ impl<T: Real> Operator<T> {
             }
         }
         products
-            .solve((&self.matrix, system, &self.interface), data, multipliers, (affordable, residual), answer)
+            .solve(
+                (&self.matrix, &self.interface),
+                (system, together),
+                data,
+                multipliers,
+                (affordable, residual),
+                answer,
+            )
             .map(Some)
     }
 
@@ -391,19 +396,22 @@ impl<T: Real> Operator<T> {
     }
 
     /// Reads what products need of the present matrix.
-    fn read_products(&mut self, system: &mut dyn System<T>, h: f64, at: At<'_, T>) -> Result<()> {
+    fn read_products(
+        &mut self,
+        (system, together): (&mut dyn System<T>, &Together<T>),
+        h: f64,
+        at: At<'_, T>,
+    ) -> Result<()> {
         if self.products.as_ref().is_some_and(|products| products.is_current) {
             return Ok(());
         }
-        if !self.varies() {
-            self.matrix.assemble(system, h, at)?;
-        }
+        together.agree(if self.varies() { Ok(()) } else { self.matrix.assemble(system, h, at) })?;
         let matrix = &self.matrix;
         let products = match &mut self.products {
             Some(products) => products,
-            none => none.insert(Box::new(Products::new(matrix, system, &self.interface)?)),
+            none => none.insert(Box::new(together.agree(Products::new(matrix, system, &self.interface))?)),
         };
-        products.read(matrix, system, h)?;
+        products.read((matrix, &self.interface), (system, together), h)?;
         if products.is_packed && !self.varies() {
             self.matrix.free_values();
         }

@@ -75,7 +75,7 @@ impl<T: Real> Product<T> {
     /// [`measure`](Self::measure).
     pub(crate) fn write_packed(&mut self, distance: usize, x: &[T], y: &mut [T]) {
         if let Self::Supervariables(supervariables) = self {
-            let highest = u8::try_from(distance + 1).unwrap_or(FAR);
+            let highest = u8::try_from(distance.saturating_add(1)).unwrap_or(FAR);
             supervariables.multiply((T::one(), None, highest), x, y, Accumulate::Replace);
         }
     }

@@ -185,6 +185,27 @@ fn in_single_precision() {
     }
 }
 
+/// At a Courant number of 12 products keep directions out of a coarse space. The weight alone moves the free body as its
+/// translations do, which that space solves without an iteration.
+#[test]
+fn long_steps_of_a_heavy_body() {
+    let size = 0.125;
+    let solid = Solid::block([1.0, 1.0, 0.75], [8, 8, 6], MATERIAL);
+    let weight: Vec<f64> =
+        (0..).zip(solid.lumped_mass::<f64>()).map(|(dof, m)| if dof % 3 == 2 { -0.01 * m } else { 0.0 }).collect();
+    let system = || {
+        let weight = weight.clone();
+        solid.system::<f64>().load(move |_, f| f.copy_from_slice(&weight))
+    };
+    let floor = Sphere::new([0.5, 0.5, -9.0], 8.99, Side::Outside).unwrap();
+    for friction in [0.0, 0.3] {
+        let contact = || on(&solid, floor, ContactLaw::Rigid, friction);
+        let [closed, _] =
+            compare(&format!("long, {friction}"), (12.0 * size, 6), &vec![0.0; solid.dofs()], system, contact);
+        assert!(closed > 20, "{closed}");
+    }
+}
+
 /// Hundreds of rows of a mortar: also the jumps are removed without a dense S.
 #[test]
 fn jumps_of_hundreds_of_rows() {

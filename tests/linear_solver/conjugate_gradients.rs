@@ -42,6 +42,7 @@ fn difference<T: Real>(x: &[T], y: &[T]) -> f64 {
 fn cases() -> Vec<(usize, Vec<Entry>)> {
     let block = Solid::block([1.0; 3], [4; 3], SOFT);
     let plate = Solid::rectangle([1.0; 2], [9; 2], SOFT);
+    let bar = Solid::block([2.0, 0.5, 0.5], [16, 4, 4], SOFT);
     let fixed = |entries: Vec<Entry>, dofs: &'static [usize]| {
         let free = move |&(i, j, _): &Entry| !dofs.contains(&i) && !dofs.contains(&j);
         entries.into_iter().filter(free).chain(dofs.iter().map(|&dof| (dof, dof, 1.0))).collect::<Vec<_>>()
@@ -53,6 +54,9 @@ fn cases() -> Vec<(usize, Vec<Entry>)> {
         (block.dofs(), effective(&block, 0.25, 2.0)),
         (block.dofs(), fixed(effective(&block, 0.25, 1.0), &[0, 1, 40, 100, 374])),
         (plate.dofs(), fixed(effective(&plate, 1.0 / 9.0, 3.0), &[0, 1, 19, 90])),
+        // Long steps, with a coarse space.
+        (bar.dofs(), fixed(effective(&bar, 0.125, 30.0), &[0, 1, 2, 300, 301, 700])),
+        (plate.dofs(), effective(&plate, 1.0 / 9.0, 20.0)),
     ]
 }
 
@@ -119,6 +123,28 @@ fn matrices_in_parts_are_solved_as_others() {
         factor.solve(&mut again).unwrap();
         assert_eq!(found, again);
     }
+}
+
+/// The condition number grows as the square of the Courant number, iterations slower than the number itself. Fixed dofs
+/// stay where they are to the last bit.
+#[test]
+fn long_steps_take_few_more_iterations() {
+    let bar = Solid::block([6.0, 0.8, 0.8], [60, 8, 8], SOFT);
+    let n = bar.dofs();
+    let fixed = |entries: Vec<Entry>| {
+        let free = |&(i, j, _): &Entry| i >= 3 && j >= 3;
+        entries.into_iter().filter(free).chain((0..3).map(|dof| (dof, dof, 7.0))).collect::<Vec<_>>()
+    };
+    let counts = [4.0, 8.0, 16.0, 32.0, 64.0].map(|courant| {
+        let a = matrix::<f64>(n, fixed(effective(&bar, 0.1, courant)));
+        let mut x = rhs::<f64>(n);
+        x[..3].fill(0.0);
+        let mut factor = factorized(&ConjugateGradients::default(), &a);
+        factor.solve(&mut x).unwrap();
+        assert_eq!(x[..3], [0.0; 3]);
+        factor.iterations()
+    });
+    assert!(counts.windows(2).all(|pair| pair[1] * 10 < 18 * pair[0]) && counts[4] < 6 * counts[0], "{counts:?}");
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! The bodies of these tests, in one piece and over ranks, and what is recorded of their runs.
 
-use crate::parts::{Gathered, Meeting, SolidPart, on_ranks};
+use crate::parts::{Gathered, Meeting, Part, SolidPart, on_ranks};
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{
-    ContactConstraint, ContactLaw, LinearRows, LinearSystem, NodesOnObstacle, Result, Simulation, SimulationBuilder,
+    ContactConstraint, ContactLaw, LinearRows, LinearSolver, LinearSystem, NodesOnObstacle, Result, Simulation,
+    SimulationBuilder,
 };
 use contact_dynamics_scenes::solids::{Material, Solid};
 use std::sync::Arc;
@@ -135,20 +136,35 @@ pub(crate) fn largest_difference(
     part: impl Fn(&SolidPart<2>) -> SimulationBuilder<'static, f64> + Sync,
     setting: Setting,
 ) -> f64 {
+    largest_difference_with(blocks, steps, whole, part, setting, |part| Box::new(Gathered(part.clone()))).0
+}
+
+/// Same, with another linear solver over ranks; and the number of products for contact over ranks.
+pub(crate) fn largest_difference_with(
+    blocks: &Blocks,
+    steps: usize,
+    whole: impl Fn() -> SimulationBuilder<'static, f64>,
+    part: impl Fn(&SolidPart<2>) -> SimulationBuilder<'static, f64> + Sync,
+    setting: Setting,
+    solver: impl Fn(&Arc<Part>) -> Box<dyn LinearSolver<f64>> + Sync,
+) -> (f64, u64) {
     let direction = |nodes: usize| [1.0, 0.5].repeat(nodes);
     let builder = whole().velocity(blocks.velocity()).constraints(blocks.contact(0.3, |node| node).unwrap());
     let mut run = setting(builder).build().unwrap();
     let expected = record(&mut run, steps, <[f64]>::to_vec, &direction(blocks.solid.nodes.len())).unwrap();
     let touching = expected.iter().filter(|seen| seen.forces.iter().any(|&force| force > 0.0)).count();
     assert!(touching > steps / 10, "{touching} steps in contact");
-    let mut largest = 0.0_f64;
+    let (mut largest, mut products) = (0.0_f64, 0);
     for count in 1..=3 {
         let runs = on_ranks(count, |rank, meeting| {
             let (own, builder) = blocks.on_rank((rank, meeting), |own| part(own)).unwrap();
-            let mut run = setting(builder).build().unwrap();
+            let mut run = setting(builder.linear_solver(solver(&own.part))).build().unwrap();
             let whole = |values: &[f64]| own.part.gather(values).unwrap();
-            record(&mut run, steps, whole, &direction(own.cut.nodes.len())).unwrap()
+            let seen = record(&mut run, steps, whole, &direction(own.cut.nodes.len())).unwrap();
+            (seen, run.statistics().contact_products)
         });
+        let (runs, counts): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
+        products += counts[0];
         for run in &runs {
             for (seen, first) in run.iter().zip(&runs[0]) {
                 let bits = |seen: &Seen| -> Vec<u64> { seen.forces.iter().map(|force| force.to_bits()).collect() };
@@ -157,7 +173,7 @@ pub(crate) fn largest_difference(
         }
         largest = largest.max(difference(&expected, &runs[0]));
     }
-    largest
+    (largest, products)
 }
 
 /// The largest difference of two records, each kind of value over its largest.

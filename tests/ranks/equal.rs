@@ -1,12 +1,14 @@
 //! Runs over ranks move as those in one piece, and contact forces are the same on all ranks to the bit.
 
-use crate::bodies::{Blocks, Setting, largest_difference, linear, linear_part};
-use crate::parts::HyperelasticPart;
+use crate::bodies::{Blocks, Setting, largest_difference, largest_difference_with, linear, linear_part};
+use crate::parts::{Gathered, HyperelasticPart, Part, SolidPart};
+use contact_dynamics::contact_solver::Assembly;
 use contact_dynamics::{
-    Bathe, CentralDifference, Composite, EnergyMomentum, GeneralizedAlpha, Newmark, Newton, Simulation,
-    SimulationBuilder, StepControl, TimeIntegrator,
+    ActiveSet, Bathe, CentralDifference, Composite, ConjugateGradients, EnergyMomentum, GeneralizedAlpha, LinearSolver,
+    Newmark, Newton, Simulation, SimulationBuilder, StepControl, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use std::sync::Arc;
 
 /// Rounding of sums in another order, over some dozens of steps with impacts.
 const SAME: f64 = 1e-10;
@@ -50,6 +52,27 @@ fn explicit_steps() {
 #[test]
 fn uncorrected_contact() {
     check_linear(|| Composite, 2e-3, false, SimulationBuilder::uncorrected);
+}
+
+/// Contact without W on every rank, and not in one piece: products with the rows of each, and sums.
+#[test]
+fn contact_by_products() {
+    let blocks = Blocks::new();
+    let never: Setting = |builder| builder.contact_solver(ActiveSet::default().with_assembly(Assembly::Never));
+    let exact = ConjugateGradients::default().tolerance(1e-14).unwrap();
+    let factor = |part: &Arc<Part>| -> Box<dyn LinearSolver<f64>> { Box::new(Gathered(part.clone())) };
+    let iteration = |part: &Arc<Part>| -> Box<dyn LinearSolver<f64>> { Box::new(exact.over_ranks(part.clone())) };
+    for consistent in [false, true] {
+        let whole = || Simulation::builder(linear(&blocks.solid, consistent), Composite, 2e-3);
+        let part = |part: &SolidPart<2>| Simulation::builder(linear_part(part, consistent), Composite, 2e-3);
+        let apart = [
+            largest_difference_with(&blocks, 60, whole, part, never, factor),
+            largest_difference_with(&blocks, 60, whole, part, never, iteration),
+        ];
+        println!("consistent mass {consistent}: {apart:?}");
+        let fits = |&(apart, products): &(f64, u64)| apart < SAME && products > 0;
+        assert!(apart.iter().all(fits), "consistent {consistent}: {apart:?}");
+    }
 }
 
 #[test]

@@ -368,6 +368,10 @@ impl Factorization<f64> for GatheredFactor {
         self.factor.stored_values()
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn condensation(&mut self) -> Option<&mut dyn Condensation<f64>> {
         self.factor.condensation().is_some().then_some(self)
     }

@@ -211,6 +211,9 @@ impl Factorization<f64> for Timed<Inner> {
     fn stored_values(&self) -> usize {
         self.part.stored_values()
     }
+    fn is_symmetric(&self) -> bool {
+        self.part.is_symmetric()
+    }
     fn iterations(&self) -> usize {
         self.part.iterations()
     }

@@ -7,7 +7,7 @@ use crate::ffi::Input;
 use crate::multigrid::Multigrid;
 use crate::share::Share;
 use crate::solver::{Direct, Way};
-use contact_dynamics::LinearSolver;
+use contact_dynamics::{ConjugateGradients, LinearSolver};
 use crate::parts::Cut;
 use std::sync::Arc;
 
@@ -19,6 +19,8 @@ pub enum Engine {
     /// Iterates: conjugate gradients with multigrid of PETSc, rows on all ranks.
     #[cfg(feature = "petsc")]
     Petsc,
+    /// Iterates: conjugate gradients of the crate, rows on all ranks.
+    Crate,
 }
 
 impl Engine {
@@ -35,6 +37,7 @@ impl Engine {
             Self::CONDENSING,
             #[cfg(feature = "petsc")]
             Self::Petsc,
+            Self::Crate,
         ]
     }
 
@@ -46,6 +49,7 @@ impl Engine {
             Self::Mumps(Way { input: Input::Distributed, condenses: true }) => "MUMPS, all ranks, Schur complement",
             #[cfg(feature = "petsc")]
             Self::Petsc => "PETSc, multigrid, rows on all ranks",
+            Self::Crate => "conjugate gradients of the crate",
         }
     }
 
@@ -65,6 +69,7 @@ impl Engine {
             "mumps" => Some(Self::CONDENSING),
             #[cfg(feature = "petsc")]
             "petsc" => Some(Self::Petsc),
+            "crate" => Some(Self::Crate),
             _ => None,
         }
     }
@@ -77,6 +82,11 @@ impl Engine {
             Self::Mumps(way) => Box::new(Timed { part: Direct { share, way, fault }, clock }),
             #[cfg(feature = "petsc")]
             Self::Petsc => Box::new(Timed { part: Multigrid::new(cut, share, fault), clock }),
+            Self::Crate => {
+                // As many digits as the other iteration.
+                let settings = ConjugateGradients::default().tolerance(1e-13).expect("less than one");
+                Box::new(Timed { part: settings.over_ranks(share), clock })
+            }
         }
     }
 }

@@ -129,6 +129,10 @@ impl Factorization<f64> for Factor {
         self.grids.stored()
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn iterations(&self) -> usize {
         self.iterations
     }

@@ -1,14 +1,18 @@
 //! Contact problems solved by products with the effective matrix, without W.
 
-use crate::contact_solver::{Outcome, Patience, ProjectedCg, RowData, SparseProblem};
+use crate::contact_solver::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
+use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, Nodes, WORTHWHILE, each_block, node_size};
 use crate::mass::Mass;
 use crate::memory;
+use crate::ranks::Together;
 use crate::real::Real;
 use crate::rounding::projected_residual;
 use crate::simulation::operator::matrix::EffectiveMatrix;
 use crate::sparse::Product;
 use crate::system::System;
+use faer::sparse::SparseColMatRef;
+use std::ops::Range;
 
 /// What products need of an effective matrix.
 #[derive(Debug)]
@@ -16,12 +20,17 @@ pub(super) struct Products<T> {
     product: Product<T>,
     /// Whether it has the entries of the matrix, packed.
     pub(super) is_packed: bool,
-    /// Number of entries at and below the diagonal that a product reads on average.
+    /// Number of entries at and below the diagonal that a product reads on average, and number of dofs: the most of
+    /// any rank.
     entries: f64,
+    dofs: f64,
     /// D⁻¹, zero on prescribed dofs.
     inverse: Vec<T>,
     /// Products that a system without contact would take.
     expected: usize,
+    /// The aggregates of the nodes that contact does not act on, and their coarse space if there is one.
+    aggregates: Option<Aggregates>,
+    space: Option<CoarseSpace<T>>,
     cg: ProjectedCg<T>,
     /// The forces of the problem solved last, on the interface; empty if it was not solved.
     answered: Vec<T>,
@@ -49,8 +58,11 @@ impl<T: Real> Products<T> {
             product,
             is_packed: false,
             entries: 0.0,
+            dofs: 0.0,
             inverse: Vec::new(),
             expected: 0,
+            aggregates: None,
+            space: None,
             cg: ProjectedCg::default(),
             answered: Vec::new(),
             is_current: false,
@@ -58,24 +70,16 @@ impl<T: Real> Products<T> {
     }
 
     /// Reads a matrix.
-    pub(super) fn read(&mut self, matrix: &EffectiveMatrix<T>, system: &dyn System<T>, h: f64) -> Result<()> {
-        let a = matrix.view(system);
-        self.is_packed = self.product.pack(a)?;
-        let entries = a.val().len().midpoint(a.ncols());
-        let (mut whole, mut mass) = (0.0, 0.0);
-        self.inverse.clear();
-        memory::make_room(&mut self.inverse, a.ncols(), "the diagonal of the effective matrix")?;
-        self.inverse.extend((0..a.ncols()).map(|dof| {
-            let at = a.row_idx_of_col_raw(dof).binary_search(&dof).ok();
-            let (Some(at), Err(_)) = (at, system.prescribed().binary_search(&dof)) else { return T::zero() };
-            let own = a.val_of_col(dof)[at];
-            whole += own.value();
-            mass += match system.mass() {
-                Mass::Lumped(mass) => mass[dof].value(),
-                Mass::Consistent(mass) => mass.val_of_col(dof).iter().map(|m| m.value()).sum(),
-            };
-            own.recip()
-        }));
+    pub(super) fn read(
+        &mut self,
+        (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
+        (system, together): (&dyn System<T>, &Together<T>),
+        h: f64,
+    ) -> Result<()> {
+        let own = self.read_own(matrix, (system, together));
+        let [whole, mass] = together.sum(own)?;
+        // Other ranks know the diagonal at dofs whose elements are all theirs.
+        together.share(&mut self.inverse)?;
         // A smooth motion has the mass of the diagonal without its stiffness; the stiffest motion has twice both.
         let condition = (2.0 * whole / (matrix.inertia(h) * mass)).max(1.0);
         let digits = (2.0 / projected_residual::<T>().value()).ln();
@@ -83,15 +87,73 @@ impl<T: Real> Products<T> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = wanted.ceil() as usize;
         self.expected = if wanted.is_finite() { count } else { usize::MAX };
-        self.entries = self.product.mean_share(self.expected.min(MANY_PRODUCTS)) * entries as f64;
+        self.space = match together.is_alone() && condition > WORTHWHILE {
+            true => self.coarse_space(matrix.view(system), interface)?,
+            false => None,
+        };
+        // Over ranks all entries are read: what is far from contact on this rank may be near it on another.
+        let share = match together.is_alone() {
+            true => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
+            false => 1.0,
+        };
+        let a = matrix.view(system);
+        let sizes = [share * a.val().len().midpoint(a.ncols()) as f64, a.ncols() as f64];
+        [self.entries, self.dofs] = together.max(Ok(sizes))?;
         self.is_current = true;
         self.begin();
         Ok(())
     }
 
+    /// The coarse space of nodes on which no contact acts: closed rows stay closed.
+    fn coarse_space(
+        &mut self,
+        a: SparseColMatRef<'_, usize, T>,
+        interface: &[usize],
+    ) -> Result<Option<CoarseSpace<T>>> {
+        let size = node_size(a.symbolic());
+        let aggregates = match &mut self.aggregates {
+            Some(aggregates) => aggregates,
+            none => none.insert(Aggregates::find(a, size, interface.iter().copied())?),
+        };
+        if aggregates.count < 2 {
+            return Ok(None);
+        }
+        let nodes = Nodes { size, count: a.ncols() / size, aggregate: &|node| aggregates.of(node) };
+        let near = |node: usize| {
+            (node * size..(node + 1) * size).flat_map(|dof| a.row_idx_of_col_raw(dof)).map(|other| other / size)
+        };
+        let identity = |_: usize, block: &mut [T]| block.iter_mut().step_by(size + 1).for_each(|x| *x = T::one());
+        CoarseSpace::new(&nodes, near, identity, |each| each_block(a, size, each))
+    }
+
+    /// Reads what this rank has. Returns the sums of the diagonals of A and of M over the free dofs that it owns.
+    fn read_own(
+        &mut self,
+        matrix: &EffectiveMatrix<T>,
+        (system, together): (&dyn System<T>, &Together<T>),
+    ) -> Result<[f64; 2]> {
+        let a = matrix.view(system);
+        self.is_packed = self.product.pack(a)?;
+        self.inverse.clear();
+        memory::make_room(&mut self.inverse, a.ncols(), "the diagonal of the effective matrix")?;
+        let free = |dof: &usize| system.prescribed().binary_search(dof).is_err();
+        let diagonal = |dof: usize| Some(a.val_of_col(dof)[a.row_idx_of_col_raw(dof).binary_search(&dof).ok()?]);
+        let own = |dof: usize| diagonal(dof).filter(|own| free(&dof) && *own != T::zero());
+        self.inverse.extend((0..a.ncols()).map(|dof| own(dof).map_or(T::zero(), T::recip)));
+        let (mut whole, mut mass) = (0.0, 0.0);
+        for dof in together.owned(a.ncols()).flatten().filter(free) {
+            whole += diagonal(dof).map_or(0.0, T::value);
+            mass += match system.mass() {
+                Mass::Lumped(mass) => mass[dof].value(),
+                Mass::Consistent(mass) => mass.val_of_col(dof).iter().map(|m| m.value()).sum(),
+            };
+        }
+        Ok([whole, mass])
+    }
+
     /// Products to be tried for rows with so many entries, if the work with W (in multiplications) is no less.
     pub(super) fn affordable(&self, entries: usize, with_w: f64) -> Option<usize> {
-        let of_one = self.entries + (8 * self.inverse.len() + 8 * entries) as f64;
+        let of_one = self.entries + 8.0 * self.dofs + (8 * entries) as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = (with_w / of_one) as usize;
         (self.expected <= count.min(MANY_PRODUCTS)).then_some(count.max(FEW_PRODUCTS))
@@ -113,21 +175,19 @@ impl<T: Real> Products<T> {
     /// Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
     pub(super) fn solve(
         &mut self,
-        (matrix, system, interface): (&EffectiveMatrix<T>, &dyn System<T>, &[usize]),
+        (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
+        (system, together): (&dyn System<T>, &Together<T>),
         data: RowData<'_, T>,
         multipliers: &mut [T],
         (affordable, residual): (usize, f64),
         [forces, response]: [&mut [T]; 2],
     ) -> Result<Outcome> {
-        let Self { product, is_packed, inverse, expected, cg, answered, .. } = self;
+        let Self { product, is_packed, inverse, expected, space, cg, answered, .. } = self;
         answered.clear();
-        let mut multiply = |reach: usize, x: &[T], y: &mut [T]| match *is_packed {
-            true => product.write_packed(reach, x, y),
-            false => product.write(T::one(), matrix.view(system), x, y),
-        };
+        let mut body = OverRanks { product, is_packed: *is_packed, space: space.as_mut(), matrix, system, together };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
-        let mut problem = SparseProblem { product: &mut multiply, inverse, data, patience };
+        let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
         let outcome = cg.solve(&mut problem, multipliers)?;
         if outcome.is_solved {
             forces.fill(T::zero());
@@ -146,5 +206,44 @@ impl<T: Real> Products<T> {
     /// The response A⁻¹ f by dof, if f are the forces of the problem solved last.
     pub(super) fn response_to(&self, forces: &[T]) -> Option<&[T]> {
         (self.answered == forces).then(|| self.cg.solution())
+    }
+}
+
+/// The effective matrix, of which each rank has the rows that it owns.
+struct OverRanks<'a, T: Real> {
+    product: &'a mut Product<T>,
+    is_packed: bool,
+    space: Option<&'a mut CoarseSpace<T>>,
+    matrix: &'a EffectiveMatrix<T>,
+    system: &'a dyn System<T>,
+    together: &'a Together<T>,
+}
+
+impl<T: Real> Body<T> for OverRanks<'_, T> {
+    fn multiply(&mut self, reach: usize, x: &[T], y: &mut [T]) -> Result<()> {
+        // With a coarse space x reaches everywhere at once, and over ranks it comes from elsewhere.
+        let reach = if self.together.is_alone() && self.space.is_none() { reach } else { usize::MAX };
+        match self.is_packed {
+            true => self.product.write_packed(reach, x, y),
+            false => self.product.write(T::one(), self.matrix.view(self.system), x, y),
+        }
+        self.together.share(y)
+    }
+
+    fn sum(&self, dofs: usize, part: &dyn Fn(Range<usize>) -> T) -> Result<T> {
+        let [sum] = self.together.sum(Ok([self.together.owned(dofs).map(part).sum::<T>().value()]))?;
+        Ok(T::of(sum))
+    }
+
+    fn start(&mut self, r: &mut [T], x: &mut [T]) -> Result<()> {
+        self.space.as_mut().map_or(Ok(()), |space| space.start(r, x).map(|_| ()))
+    }
+
+    fn turn(&mut self, p: &mut [T]) -> Result<()> {
+        self.space.as_mut().map_or(Ok(()), |space| space.turn(p).map(|_| ()))
+    }
+
+    fn agree(&self, result: Result<bool>) -> Result<bool> {
+        self.together.agree(result)
     }
 }

@@ -147,7 +147,8 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let exact = projected_residual::<T>().value();
         let residual = if sets.len() < rows.len() { exact } else { curved.residual };
         let solved = operator.solve_by_products(
-            (&mut *host.system, clock.h, at),
+            (&mut *host.system, host.together),
+            (clock.h, at),
             (assembly, residual),
             RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[] },
             multipliers,
