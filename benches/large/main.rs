@@ -4,7 +4,7 @@
 //!   a wavy floor.
 //! - `-- heap [cells a side]…` (default 20 to 100): ten slabs lie on each other, all their nodes pressed.
 //! - `-- courant [cells a side]` (default 40): the slab with a weight, in steps of Courant numbers up to 64, beside the
-//!   factor.
+//!   factor; the figure goes to `target/large/courant.svg`.
 //! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
 //! - `-- explicit [cells a side]…` (default 60 and 100): the slab by CD-Lagrange, beside its steps without contact.
 
@@ -17,6 +17,7 @@ use contact_dynamics::{
     Simulation, SimulationBuilder, TimeIntegrator,
 };
 use contact_dynamics_scenes::solids::Material;
+use example_support::plot::{Axis, BLUE, Curve, Panel, SKY, VERMILION, pair};
 use example_support::timing::{Arguments, median};
 use grid::Grid;
 use std::f64::consts::PI;
@@ -27,19 +28,19 @@ const MATERIAL: Material = Material { young: 1.0, poisson: 0.3, density: 1.0 };
 /// Velocity of a fall: strains are of this order.
 const SPEED: f64 = 0.01;
 
-fn main() -> Result<()> {
+fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let is_given = |word: &str| std::env::args().any(|argument| argument == word);
     println!("a pass over a gigabyte of memory takes {:.3} s on one thread", bandwidth());
     if is_given("heap") {
-        heaps(&Arguments::read(&[20, 40, 60, 80, 100], &[4]))
+        Ok(heaps(&Arguments::read(&[20, 40, 60, 80, 100], &[4]))?)
     } else if is_given("courant") {
         courants(&Arguments::read(&[40], &[6]))
     } else if is_given("exact") {
-        exact(&Arguments::read(&[46], &[6]))
+        Ok(exact(&Arguments::read(&[46], &[6]))?)
     } else if is_given("explicit") {
-        explicit(&Arguments::read(&[60, 100], &[6]))
+        Ok(explicit(&Arguments::read(&[60, 100], &[6]))?)
     } else {
-        slabs(&Arguments::read(&[20, 40, 60, 80, 100, 130], &[6]))
+        Ok(slabs(&Arguments::read(&[20, 40, 60, 80, 100, 130], &[6]))?)
     }
 }
 
@@ -134,8 +135,8 @@ fn cost(run: &mut Simulation<'_, f64>, steps: usize) -> Result<Cost> {
     Ok(Cost { time: median(&times), closed: closed(run), products })
 }
 
-/// Prints what a run costs: without contact, in the step of first contact, and later; returns the time of a late step.
-fn row(name: &str, dofs: usize, builder: impl FnOnce() -> Result<SimulationBuilder<'static, f64>>) -> Result<f64> {
+/// Prints what a run costs: without contact, in the step of first contact, and later; returns the cost of late steps.
+fn row(name: &str, dofs: usize, builder: impl FnOnce() -> Result<SimulationBuilder<'static, f64>>) -> Result<Cost> {
     let builder = builder()?;
     let start = Instant::now();
     let mut run = builder.build()?;
@@ -148,13 +149,14 @@ fn row(name: &str, dofs: usize, builder: impl FnOnce() -> Result<SimulationBuild
         alone[usize::from(closed(&run) > 0)] = start.elapsed().as_secs_f64();
     }
     cost(&mut run, 8)?;
-    let Cost { time, closed, products } = cost(&mut run, 5)?;
+    let late = cost(&mut run, 5)?;
+    let Cost { time, closed, products } = late;
     let [open, first] = alone.map(|own| if own.is_nan() { "–".into() } else { format!("{own:.3}") });
     println!(
         "{name:<12} {dofs:>8} {closed:>7} {products:>9.1} {open:>8} {first:>8} {time:>8.3} {build:>8.1} {:>9.2}",
         memory()
     );
-    Ok(time)
+    Ok(late)
 }
 
 fn header() {
@@ -174,7 +176,7 @@ fn slabs(arguments: &Arguments) -> Result<()> {
     for &cells in &arguments.sizes {
         let grid = slab(cells);
         let builder = || Ok(falling(&grid, step(&grid, 1.0))?.linear_solver(ConjugateGradients::default()));
-        let time = row(&format!("slab {cells}"), grid.dofs(), builder)?;
+        let Cost { time, .. } = row(&format!("slab {cells}"), grid.dofs(), builder)?;
         if let Some((dofs, last)) = before.replace((grid.dofs() as f64, time)) {
             let exponent = f64::ln(time / last) / f64::ln(grid.dofs() as f64 / dofs);
             println!("{:<12} twice the dofs take {:.2} times as long", "", 2.0_f64.powf(exponent));
@@ -215,10 +217,13 @@ fn heaps(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-fn courants(arguments: &Arguments) -> Result<()> {
+/// Prints a table, and draws the last size: a step in contact, and its products for contact.
+fn courants(arguments: &Arguments) -> std::result::Result<(), Box<dyn std::error::Error>> {
     header();
+    let mut drawn = [const { Vec::new() }; 3];
     for &cells in &arguments.sizes {
         let grid = slab(cells);
+        drawn.iter_mut().for_each(Vec::clear);
         for courant in [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0] {
             for factor in [false, true] {
                 let builder = || {
@@ -228,10 +233,47 @@ fn courants(arguments: &Arguments) -> Result<()> {
                         false => builder.linear_solver(ConjugateGradients::default()),
                     })
                 };
-                row(&format!("{} {courant}", if factor { "factor" } else { "cg" }), grid.dofs(), builder)?;
+                let name = format!("{} {courant}", if factor { "factor" } else { "cg" });
+                let Cost { time, products, .. } = row(&name, grid.dofs(), builder)?;
+                drawn[usize::from(factor)].push((courant.log10(), time.log10()));
+                if !factor {
+                    drawn[2].push((courant.log10(), products.log10()));
+                }
             }
         }
     }
+    let [iteration, factor, products] = drawn;
+    let curve = |label: &str, color, points| Curve { label: Some(label.into()), color, width: 7, points };
+    let panel = |title: &str, y, curves| Panel {
+        title: title.into(),
+        x: Axis::decades("Courant number", 0, 2, 1),
+        y,
+        curves,
+        note: None,
+    };
+    let first = products.first().map_or(0.0, |point| point.1);
+    let figure = pair(
+        "Long steps of a slab on a wavy floor",
+        "Conjugate gradients, with a coarse space from a Courant number of eight on, and a factor.",
+        &[
+            panel(
+                "A step in contact",
+                Axis::decades("time (s)", -2, 1, 1),
+                vec![curve("factor", VERMILION, factor), curve("conjugate gradients", BLUE, iteration)],
+            ),
+            panel(
+                "Products for contact",
+                Axis::decades("products a step", 1, 4, 1),
+                vec![
+                    curve("as the Courant number", SKY, vec![(0.0, first), (2.0, first + 2.0)]),
+                    curve("conjugate gradients", BLUE, products),
+                ],
+            ),
+        ],
+    )?;
+    let folder = std::path::Path::new("target/large");
+    std::fs::create_dir_all(folder)?;
+    std::fs::write(folder.join("courant.svg"), figure)?;
     Ok(())
 }
 

@@ -35,15 +35,13 @@ pub(crate) fn subtract<T: Scalar>(a: NodeRows<'_, T>, rows: Range<usize>, weight
 
 #[inline]
 fn gather_blocks<T: Scalar, const B: usize>(a: NodeRows<'_, T>, rows: Range<usize>, x: &[T], sums: &mut [T]) {
-    for (row, x) in rows.zip(x.chunks_exact(B)) {
+    for (row, x) in rows.zip(x.as_chunks::<B>().0) {
         let range = a.pointers[row]..a.pointers[row + 1];
         let blocks = a.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
         for (&column, block) in a.columns[range].iter().zip(blocks) {
-            let sums = &mut sums[column as usize * B..][..B];
-            for c in 0..B {
-                for r in 0..B {
-                    sums[c] += block[c * B + r] * x[r];
-                }
+            let own: [T; B] = std::array::from_fn(|c| (0..B).map(|r| block[c * B + r] * x[r]).sum());
+            for (sum, own) in sums[column as usize * B..][..B].iter_mut().zip(own) {
+                *sum += own;
             }
         }
     }
@@ -51,16 +49,18 @@ fn gather_blocks<T: Scalar, const B: usize>(a: NodeRows<'_, T>, rows: Range<usiz
 
 #[inline]
 fn subtract_blocks<T: Scalar, const B: usize>(a: NodeRows<'_, T>, rows: Range<usize>, weights: &[T], x: &mut [T]) {
-    for (row, x) in rows.zip(x.chunks_exact_mut(B)) {
+    for (row, x) in rows.zip(x.as_chunks_mut::<B>().0) {
         let range = a.pointers[row]..a.pointers[row + 1];
         let blocks = a.values[range.start * B * B..range.end * B * B].chunks_exact(B * B);
+        let mut own = *x;
         for (&column, block) in a.columns[range].iter().zip(blocks) {
             let weights = &weights[column as usize * B..][..B];
             for c in 0..B {
                 for r in 0..B {
-                    x[r] -= block[c * B + r] * weights[c];
+                    own[r] -= block[c * B + r] * weights[c];
                 }
             }
         }
+        *x = own;
     }
 }

@@ -9,6 +9,7 @@ use crate::memory;
 use crate::real::Real;
 use crate::threads::{self, Threads};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use std::ops::Range;
 
 /// What memory is asked for.
 const WHAT: &str = "a coarse space";
@@ -117,38 +118,6 @@ impl Aggregates {
     }
 }
 
-/// Calls `each` with row, column and values of each block of `size`² of a matrix.
-pub(crate) fn each_block<T: Real>(
-    a: SparseColMatRef<'_, usize, T>,
-    size: usize,
-    each: &mut dyn FnMut(usize, usize, &[T]),
-) {
-    let (mut rows, mut values): (Vec<usize>, Vec<T>) = (Vec::new(), Vec::new());
-    for column in 0..a.ncols() / size {
-        rows.clear();
-        rows.extend(
-            (column * size..(column + 1) * size).flat_map(|dof| a.row_idx_of_col_raw(dof)).map(|row| row / size),
-        );
-        rows.sort_unstable();
-        rows.dedup();
-        values.clear();
-        values.resize(rows.len() * size * size, T::zero());
-        for c in 0..size {
-            let mut at = 0;
-            let dof = column * size + c;
-            for (&row, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
-                while rows[at] < row / size {
-                    at += 1;
-                }
-                values[(at * size + c) * size + row % size] = value;
-            }
-        }
-        for (&row, block) in rows.iter().zip(values.chunks_exact(size * size)) {
-            each(row, column, block);
-        }
-    }
-}
-
 /// A matrix with a row of blocks for each node and a column for each aggregate.
 #[derive(Debug, Default)]
 pub(crate) struct Rows<T> {
@@ -170,6 +139,21 @@ impl<T: Real> Rows<T> {
 
     fn nodes(&self) -> usize {
         self.pointers.len() - 1
+    }
+
+    /// The threads that a product deserves.
+    fn threads(&self) -> Threads {
+        if self.values.len() < threads::GRAIN { Threads::One } else { Threads::All }
+    }
+
+    /// The places of the blocks of a node.
+    fn range(&self, node: usize) -> Range<usize> {
+        self.pointers[node]..self.pointers[node + 1]
+    }
+
+    /// The aggregate of the only block of a node, if it has one.
+    fn only(&self, node: usize) -> Option<usize> {
+        self.columns[self.range(node)].first().map(|&own| own as usize)
     }
 
     /// Zero, with blocks where `columns` says for each node, in any order and more than once.
@@ -194,7 +178,7 @@ impl<T: Real> Rows<T> {
 
     /// The block of a node and an aggregate, stored column by column.
     fn block(&mut self, node: usize, aggregate: usize) -> &mut [T] {
-        let range = self.pointers[node]..self.pointers[node + 1];
+        let range = self.range(node);
         let at = range.start + self.columns[range].partition_point(|&own| (own as usize) < aggregate);
         &mut self.values[at * self.size * self.size..][..self.size * self.size]
     }
@@ -202,7 +186,7 @@ impl<T: Real> Rows<T> {
     /// `x −= A weights`.
     pub(crate) fn subtract(&self, weights: &[T], x: &mut [T]) {
         let (view, chunk) = (self.view(), self.nodes().div_ceil(CHUNKS).max(1));
-        threads::each_chunk(Threads::All, x, chunk * self.size, &|number, x: &mut [T]| {
+        threads::each_chunk(self.threads(), x, chunk * self.size, &|number, x: &mut [T]| {
             let first = number * chunk;
             T::subtract_coarse(view, first..first + x.len() / self.size, weights, x);
         });
@@ -211,7 +195,7 @@ impl<T: Real> Rows<T> {
     /// `sums = Aᵀ x`, with memory for partial sums.
     fn gather(&self, x: &[T], partial: &mut [T], sums: &mut [T]) {
         let (view, chunk) = (self.view(), self.nodes().div_ceil(CHUNKS).max(1));
-        threads::each_chunk(Threads::All, partial, sums.len().max(1), &|number, own: &mut [T]| {
+        threads::each_chunk(self.threads(), partial, sums.len().max(1), &|number, own: &mut [T]| {
             own.fill(T::zero());
             let rows = (number * chunk).min(self.nodes())..((number + 1) * chunk).min(self.nodes());
             T::gather_coarse(view, rows.clone(), &x[rows.start * self.size..rows.end * self.size], own);
@@ -231,65 +215,113 @@ const CHUNKS: usize = 8;
 pub(crate) struct CoarseSpace<T> {
     z: Rows<T>,
     az: Rows<T>,
+    /// Zᵀ A Z.
+    pointers: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<T>,
     factor: Box<dyn Factorization<T>>,
     /// μ of the last projection, and partial sums.
     weights: Vec<T>,
     partial: Vec<T>,
 }
 
-/// The nodes of a matrix in blocks of `size`², and their aggregates, `None` if a node has none.
-pub(crate) struct Nodes<'a> {
-    pub(crate) size: usize,
-    pub(crate) count: usize,
-    pub(crate) aggregate: &'a dyn Fn(usize) -> Option<usize>,
-}
-
 impl<T: Real> CoarseSpace<T> {
-    /// `None` if Zᵀ A Z is not definite. `near` lists the nodes that couple with a node, itself among them; `z` writes the block of Z of a node;
-    /// `couplings` calls its argument with row, column and values of each block of A, or of a part of each.
+    /// For a matrix in blocks of `size`² and the aggregate of each node. `near` lists the nodes that couple with a node,
+    /// itself among them.
     pub(crate) fn new<I: Iterator<Item = usize>>(
-        nodes: &Nodes<'_>,
+        (size, nodes): (usize, usize),
+        aggregate: impl Fn(usize) -> Option<usize>,
         near: impl Fn(usize) -> I,
-        z: impl Fn(usize, &mut [T]),
-        couplings: impl FnOnce(&mut dyn FnMut(usize, usize, &[T])),
-    ) -> Result<Option<Self>> {
-        let &Nodes { size, count, aggregate } = nodes;
-        let mut own = Rows::zero(size, count, |node| aggregate(node).into_iter())?;
-        for node in 0..count {
-            if let Some(of_node) = aggregate(node) {
-                z(node, own.block(node, of_node));
+    ) -> Result<Self> {
+        let z = Rows::zero(size, nodes, |node| aggregate(node).into_iter())?;
+        let az = Rows::zero(size, nodes, |node| near(node).filter_map(&aggregate))?;
+        let aggregates = z.columns.iter().max().map_or(0, |&last| last as usize + 1);
+        // Which aggregates couple.
+        let mut coupled: Vec<Vec<usize>> = vec![Vec::new(); aggregates];
+        for node in 0..nodes {
+            let Some(own) = z.only(node) else { continue };
+            for &other in &az.columns[az.range(node)] {
+                let coupled = &mut coupled[other as usize];
+                if !coupled.contains(&own) {
+                    coupled.push(own);
+                }
             }
         }
-        let mut az = Rows::zero(size, count, |node| near(node).filter_map(aggregate))?;
-        couplings(&mut |row, column, block| add_coupling(&mut az, (nodes, &own), (row, column), block));
-        let aggregates = own.columns.iter().max().map_or(0, |&last| last as usize + 1);
-        let factor = match factorize(&own, &az, aggregates) {
-            Err(Error::Singular { .. }) => return Ok(None),
-            factor => factor?,
-        };
-        let weights = memory::zeros(aggregates, size, WHAT)?;
-        let partial = memory::zeros(weights.len(), CHUNKS, WHAT)?;
-        Ok(Some(Self { z: own, az, factor, partial, weights }))
+        let blocks: usize = coupled.iter().map(Vec::len).sum();
+        let (mut pointers, mut rows) = (vec![0], memory::reserve(blocks, size * size, WHAT)?);
+        for coupled in &mut coupled {
+            coupled.sort_unstable();
+            for _ in 0..size {
+                rows.extend(coupled.iter().flat_map(|&own| own * size..(own + 1) * size));
+                pointers.push(rows.len());
+            }
+        }
+        let dofs = aggregates * size;
+        let pattern = SymbolicSparseColMatRef::new_checked(dofs, dofs, &pointers, None, &rows);
+        let factor = Cholesky::default().analyze(pattern, &[])?;
+        let (values, weights) = (memory::zeros(rows.len(), 1, WHAT)?, memory::zeros(dofs, 1, WHAT)?);
+        let partial = memory::zeros(dofs, CHUNKS, WHAT)?;
+        Ok(Self { z, az, pointers, rows, values, factor, weights, partial })
     }
 
-    /// B Z for a matrix B with entries where A has them, given as A is.
-    pub(crate) fn product(
-        &self,
-        nodes: &Nodes<'_>,
-        couplings: impl FnOnce(&mut dyn FnMut(usize, usize, &[T])),
-    ) -> Result<Rows<T>> {
+    /// Forms all for a matrix. `z` writes the block of Z of a node, and `matrix` adds the entries of the matrix. Returns
+    /// whether Zᵀ A Z is definite.
+    pub(crate) fn form(
+        &mut self,
+        z: impl Fn(usize, &mut [T]),
+        matrix: impl FnOnce(&mut Product<'_, T>),
+    ) -> Result<bool> {
+        let Self { z: own, az, pointers, rows, values, factor, weights, .. } = self;
+        let size = own.size;
+        for node in 0..own.nodes() {
+            if let Some(aggregate) = own.only(node) {
+                z(node, own.block(node, aggregate));
+            }
+        }
+        az.values.fill(T::zero());
+        matrix(&mut Product { z: own, product: az });
+        values.fill(T::zero());
+        for node in 0..own.nodes() {
+            let Some(aggregate) = own.only(node) else { continue };
+            let of_z = &own.values[own.pointers[node] * size * size..][..size * size];
+            for at in az.range(node) {
+                let of_az = &az.values[at * size * size..][..size * size];
+                for c in 0..size {
+                    let column = az.columns[at] as usize * size + c;
+                    let range = pointers[column]..pointers[column + 1];
+                    let first = range.start + rows[range].partition_point(|&row| row < aggregate * size);
+                    for (r, value) in values[first..first + size].iter_mut().enumerate() {
+                        *value += (0..size).map(|k| of_z[r * size + k] * of_az[c * size + k]).sum();
+                    }
+                }
+            }
+        }
+        let pattern = SymbolicSparseColMatRef::new_checked(weights.len(), weights.len(), pointers, None, rows);
+        match factor.factorize(SparseColMatRef::new(pattern, values)) {
+            Err(Error::Singular { .. }) => Ok(false),
+            factorized => factorized.map(|()| true),
+        }
+    }
+
+    /// Zero, with blocks where A Z has them.
+    pub(crate) fn rows(&self) -> Result<Rows<T>> {
         let Rows { size, pointers, columns, values } = &self.az;
         let mut rows = Rows { size: *size, ..Rows::default() };
         memory::copy(&mut rows.pointers, pointers, WHAT)?;
         memory::copy(&mut rows.columns, columns, WHAT)?;
         rows.values = memory::zeros(values.len(), 1, WHAT)?;
-        couplings(&mut |row, column, block| add_coupling(&mut rows, (nodes, &self.z), (row, column), block));
         Ok(rows)
+    }
+
+    /// Forms B Z for a matrix B with entries where A has them.
+    pub(crate) fn multiply(&self, product: &mut Rows<T>, matrix: impl FnOnce(&mut Product<'_, T>)) {
+        product.values.fill(T::zero());
+        matrix(&mut Product { z: &self.z, product });
     }
 
     /// Solves in the space: x += Z μ and r −= A Z μ, so that Zᵀ r = 0. Returns μᵀ Zᵀ A Z μ.
     pub(crate) fn start(&mut self, r: &mut [T], x: &mut [T]) -> Result<f64> {
-        let Self { z, az, factor, weights, partial } = self;
+        let Self { z, az, factor, weights, partial, .. } = self;
         z.gather(r, partial, weights);
         let right = &mut partial[..weights.len()];
         right.copy_from_slice(weights);
@@ -303,7 +335,7 @@ impl<T: Real> CoarseSpace<T> {
 
     /// p −= Z μ, so that Zᵀ A p = 0. Returns μ.
     pub(crate) fn turn(&mut self, p: &mut [T]) -> Result<&[T]> {
-        let Self { z, az, factor, weights, partial } = self;
+        let Self { z, az, factor, weights, partial, .. } = self;
         az.gather(p, partial, weights);
         factor.solve(weights)?;
         z.subtract(weights, p);
@@ -312,74 +344,44 @@ impl<T: Real> CoarseSpace<T> {
 
     /// Number of stored values.
     pub(crate) fn stored_values(&self) -> usize {
-        let Self { z, az, factor, partial, .. } = self;
-        z.values.len() + az.values.len() + factor.stored_values() + partial.len()
+        let Self { z, az, values, factor, partial, .. } = self;
+        [&z.values, &az.values, values, partial].iter().map(|part| part.len()).sum::<usize>() + factor.stored_values()
     }
 }
 
-/// Adds the block A_IJ of a matrix, times the block of Z of J, to A Z.
-fn add_coupling<T: Real>(
-    az: &mut Rows<T>,
-    (nodes, z): (&Nodes<'_>, &Rows<T>),
-    (row, column): (usize, usize),
-    block: &[T],
-) {
-    let size = nodes.size;
-    let Some(aggregate) = (nodes.aggregate)(column) else { return };
-    let of_column = &z.values[z.pointers[column] * size * size..][..size * size];
-    let sums = az.block(row, aggregate);
-    for c in 0..size {
-        for k in 0..size {
-            T::axpy(of_column[c * size + k], &block[k * size..][..size], &mut sums[c * size..][..size]);
-        }
-    }
+/// The product of a matrix, given part by part, with Z.
+#[derive(Debug)]
+pub(crate) struct Product<'a, T> {
+    z: &'a Rows<T>,
+    product: &'a mut Rows<T>,
 }
 
-/// The factor of Zᵀ A Z.
-fn factorize<T: Real>(z: &Rows<T>, az: &Rows<T>, aggregates: usize) -> Result<Box<dyn Factorization<T>>> {
-    let size = z.size;
-    let of_node = |node: usize| z.columns[z.pointers[node]..z.pointers[node + 1]].first().map(|&own| own as usize);
-    let others = |node: usize| az.pointers[node]..az.pointers[node + 1];
-    // Columns of aggregates, then of their dofs.
-    let mut near: Vec<Vec<usize>> = vec![Vec::new(); aggregates];
-    for node in 0..z.nodes() {
-        let Some(own) = of_node(node) else { continue };
-        for &other in &az.columns[others(node)] {
-            let near = &mut near[other as usize];
-            if !near.contains(&own) {
-                near.push(own);
-            }
-        }
-    }
-    let blocks: usize = near.iter().map(Vec::len).sum();
-    let (mut pointers, mut rows) = (vec![0], memory::reserve(blocks, size * size, WHAT)?);
-    for near in &mut near {
-        near.sort_unstable();
-        for _ in 0..size {
-            rows.extend(near.iter().flat_map(|&own| own * size..(own + 1) * size));
-            pointers.push(rows.len());
-        }
-    }
-    let mut values: Vec<T> = memory::zeros(rows.len(), 1, WHAT)?;
-    for node in 0..z.nodes() {
-        let Some(own) = of_node(node) else { continue };
-        let of_z = &z.values[z.pointers[node] * size * size..][..size * size];
-        for at in others(node) {
-            let other = az.columns[at] as usize;
-            let of_az = &az.values[at * size * size..][..size * size];
-            let place = near[other].partition_point(|&before| before < own);
-            for c in 0..size {
+impl<T: Real> Product<'_, T> {
+    /// Adds a block of the matrix, stored column by column.
+    pub(crate) fn add_block(&mut self, row: usize, column: usize, block: &[T]) {
+        let Self { z, product } = self;
+        let Some(aggregate) = z.only(column) else { return };
+        let size = z.size;
+        let of_z = &z.values[z.pointers[column] * size * size..][..size * size];
+        let sums = product.block(row, aggregate);
+        for c in 0..size {
+            for k in 0..size {
                 for r in 0..size {
-                    let product: T = (0..size).map(|k| of_z[r * size + k] * of_az[c * size + k]).sum();
-                    values[pointers[other * size + c] + place * size + r] += product;
+                    sums[c * size + r] += block[k * size + r] * of_z[c * size + k];
                 }
             }
         }
     }
-    let dofs = aggregates * size;
-    let pattern = SymbolicSparseColMatRef::new_checked(dofs, dofs, &pointers, None, &rows);
-    let mut factor = Cholesky::default().analyze(pattern, &[])?;
-    factor.factorize(SparseColMatRef::new(pattern, &values))?;
-    factor.release();
-    Ok(factor)
+
+    /// Adds an entry of the matrix, given by dofs.
+    pub(crate) fn add_entry(&mut self, row: usize, column: usize, value: T) {
+        let Self { z, product } = self;
+        let size = z.size;
+        let Some(aggregate) = z.only(column / size) else { return };
+        let of_z = &z.values[z.pointers[column / size] * size * size..][..size * size];
+        let sums = product.block(row / size, aggregate);
+        for c in 0..size {
+            sums[c * size + row % size] += value * of_z[c * size + column % size];
+        }
+    }
 }

@@ -27,6 +27,11 @@ use std::ops::Range;
 /// the Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky).
 /// They need the memory of half the matrix; factors of solids need ten to a hundred times as much.
 ///
+/// At Courant numbers of about eight and more, for matrices whose condition number is estimated above 40, directions are
+/// kept A-orthogonal to a coarse space, the translations of aggregates of about 125 nodes (deflation: Nicolaides, SIAM J.
+/// Numer. Anal. 24, 1987). Twice the Courant number then takes 1.3 to 1.7 times as many iterations instead of twice as
+/// many. The space needs half as much memory again.
+///
 /// Every solve starts from zero and uses no data of earlier ones. Steps solve for the increment from the predicted
 /// motion, so zero is the prediction itself, and a run resumed from a clone is bitwise the same.
 ///
@@ -127,8 +132,9 @@ struct Matrix<T: Real> {
     values: Vec<T>,
     /// C⁻¹ of the diagonal blocks C Cᵀ.
     scaling: Vec<T>,
-    /// The coarse space, if there is one, and what it needs of the pattern.
+    /// The coarse space, if one has been formed, what it needs of the pattern, and whether the matrix is worth it.
     deflation: Option<Deflation<T>>,
+    deflates: bool,
     places: Option<Places>,
     /// Five vectors.
     vectors: Vec<T>,
@@ -223,6 +229,7 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
             values,
             scaling,
             deflation: None,
+            deflates: false,
             places: None,
             vectors: memory::zeros(dofs, 5, "the vectors of conjugate gradients")?,
             cursor: Vec::with_capacity(dofs),
@@ -284,16 +291,17 @@ impl<T: Real> Factorization<T> for Matrix<T> {
         let condition = self.fill(a)?;
         T::scale_blocks(self.size, (&self.pointers, &self.columns), &mut self.values, &mut self.scaling)
             .map_err(|dof| Error::Singular { matrix: "effective matrix", dof: self.parts.dof(dof, self.size) })?;
-        match condition > coarse_space::WORTHWHILE {
-            true => self.deflate(a)?,
-            false => self.deflation = None,
+        self.deflates = condition > coarse_space::WORTHWHILE;
+        if self.deflates {
+            self.deflate(a)?;
         }
         self.state = Ready::Yes;
         Ok(())
     }
 
     fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        let Self { settings, dofs, size, parts, pointers, columns, values, scaling, deflation, vectors, .. } = self;
+        let Self { settings, dofs, size, parts, pointers, columns, values, scaling, vectors, .. } = self;
+        let mut deflation = self.deflation.as_mut().filter(|space| self.deflates && space.is_definite);
         if self.state == Ready::No {
             let part = "conjugate gradients".into();
             return Err(Error::Incompatible { part, reason: "no matrix has been factorized" });
@@ -311,9 +319,9 @@ impl<T: Real> Factorization<T> for Matrix<T> {
             for (row, values) in column.chunks_exact(*size).enumerate() {
                 vectors[*dofs + parts.place(row) * *size..][..*size].copy_from_slice(values);
             }
-            let space = deflation.as_mut().map(|space| -> &mut dyn conjugate_gradients::Deflation<T> { space });
+            let space = deflation.as_deref_mut().map(|space| -> &mut dyn conjugate_gradients::Deflation<T> { space });
             let [outcome] = T::conjugate_gradients(*size, &iteration, space, Vectors::of(vectors, *dofs));
-            if let Some(error) = deflation.as_mut().and_then(Deflation::failure) {
+            if let Some(error) = deflation.as_deref_mut().and_then(Deflation::failure) {
                 return Err(error);
             }
             for (row, values) in column.chunks_exact_mut(*size).enumerate() {

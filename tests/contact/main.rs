@@ -11,6 +11,7 @@ mod curved_patch;
 mod dashpots;
 mod dual;
 mod edges;
+mod folded_strip;
 mod gap_function;
 mod hertz;
 mod itself;

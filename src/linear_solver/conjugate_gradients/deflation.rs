@@ -3,16 +3,21 @@
 use super::Matrix;
 use crate::error::{Error, Result};
 use crate::kernels::conjugate_gradients::{self, Blocks};
-use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, Nodes, Rows};
+use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, Product, Rows};
 use crate::memory;
 use crate::real::Real;
 use faer::sparse::SparseColMatRef;
+
+/// Entries of the largest block.
+const LARGEST: usize = 9;
 
 /// The space, and (1 + Lᵀ) Z.
 #[derive(Debug)]
 pub(super) struct Deflation<T: Real> {
     space: CoarseSpace<T>,
     upper: Rows<T>,
+    /// Whether it can be used.
+    pub(super) is_definite: bool,
     /// Why a solve has no result.
     failure: Option<Error>,
 }
@@ -37,9 +42,9 @@ fn transposed_factor<T: Real>(size: usize, inverse: &[T], block: &mut [T]) {
 }
 
 impl<T: Real> Matrix<T> {
-    /// Makes the coarse space anew, for a matrix that has been scaled.
+    /// Forms the coarse space of a matrix that has been scaled.
     pub(super) fn deflate(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let Self { size, parts, pointers, columns, values, scaling, places, .. } = self;
+        let Self { size, parts, pointers, columns, values, scaling, places, deflation, .. } = self;
         let (size, count) = (*size, pointers.len() - 1);
         let places = match places {
             Some(places) => places,
@@ -50,46 +55,47 @@ impl<T: Real> Matrix<T> {
             }
         };
         if places.aggregates.count < 2 {
-            self.deflation = None;
             return Ok(());
         }
-        let aggregate = |place: usize| places.aggregates.of(places.nodes[place]);
-        let near = |place: usize| {
-            let node = places.nodes[place];
-            let dofs = node * size..(node + 1) * size;
-            dofs.flat_map(|dof| a.row_idx_of_col_raw(dof)).map(|other| parts.place(other / size)).chain([place])
+        let deflation = match deflation {
+            Some(deflation) => deflation,
+            none => {
+                let aggregate = |place: usize| places.aggregates.of(places.nodes[place]);
+                let near = |place: usize| {
+                    let node = places.nodes[place];
+                    let others = (node * size..(node + 1) * size).flat_map(|dof| a.row_idx_of_col_raw(dof));
+                    others.map(|other| parts.place(other / size)).chain([place])
+                };
+                let space = CoarseSpace::new((size, count), aggregate, near)?;
+                let upper = space.rows()?;
+                none.insert(Deflation { space, upper, is_definite: false, failure: None })
+            }
         };
-        let identity: Vec<T> =
-            (0..size * size).map(|at| if at % (size + 1) == 0 { T::one() } else { T::zero() }).collect();
+        let z = |place: usize, block: &mut [T]| transposed_factor(size, &scaling[place * size * size..], block);
         let lower = Blocks { pointers, columns, values };
-        let couplings = |has_lower: bool, each: &mut dyn FnMut(usize, usize, &[T])| {
-            let mut transposed = identity.clone();
+        let add = |has_lower: bool, product: &mut Product<'_, T>| {
+            let mut other = [T::zero(); LARGEST];
             for row in 0..count {
-                each(row, row, &identity);
+                other[..size * size].fill(T::zero());
+                other[..size * size].iter_mut().step_by(size + 1).for_each(|entry| *entry = T::one());
+                product.add_block(row, row, &other);
                 for at in lower.pointers[row]..lower.pointers[row + 1] {
                     let (column, block) =
                         (lower.columns[at] as usize, &lower.values[at * size * size..][..size * size]);
                     for c in 0..size {
                         for r in 0..size {
-                            transposed[r * size + c] = block[c * size + r];
+                            other[r * size + c] = block[c * size + r];
                         }
                     }
                     if has_lower {
-                        each(row, column, block);
+                        product.add_block(row, column, block);
                     }
-                    each(column, row, &transposed);
+                    product.add_block(column, row, &other);
                 }
             }
         };
-        let nodes = Nodes { size, count, aggregate: &aggregate };
-        let z = |place: usize, block: &mut [T]| transposed_factor(size, &scaling[place * size * size..], block);
-        self.deflation = match CoarseSpace::new(&nodes, near, z, |each| couplings(true, each))? {
-            Some(space) => {
-                let upper = space.product(&nodes, |each| couplings(false, each))?;
-                Some(Deflation { space, upper, failure: None })
-            }
-            None => None,
-        };
+        deflation.is_definite = deflation.space.form(z, |product| add(true, product))?;
+        deflation.space.multiply(&mut deflation.upper, |product| add(false, product));
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::contact_solver::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
-use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, Nodes, WORTHWHILE, each_block, node_size};
+use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, WORTHWHILE, node_size};
 use crate::mass::Mass;
 use crate::memory;
 use crate::ranks::Together;
@@ -31,6 +31,7 @@ pub(super) struct Products<T> {
     /// The aggregates of the nodes that contact does not act on, and their coarse space if there is one.
     aggregates: Option<Aggregates>,
     space: Option<CoarseSpace<T>>,
+    deflates: bool,
     cg: ProjectedCg<T>,
     /// The forces of the problem solved last, on the interface; empty if it was not solved.
     answered: Vec<T>,
@@ -63,6 +64,7 @@ impl<T: Real> Products<T> {
             expected: 0,
             aggregates: None,
             space: None,
+            deflates: false,
             cg: ProjectedCg::default(),
             answered: Vec::new(),
             is_current: false,
@@ -87,10 +89,8 @@ impl<T: Real> Products<T> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = wanted.ceil() as usize;
         self.expected = if wanted.is_finite() { count } else { usize::MAX };
-        self.space = match together.is_alone() && condition > WORTHWHILE {
-            true => self.coarse_space(matrix.view(system), interface)?,
-            false => None,
-        };
+        self.deflates =
+            together.is_alone() && condition > WORTHWHILE && self.form_coarse_space(matrix.view(system), interface)?;
         // Over ranks all entries are read: what is far from contact on this rank may be near it on another.
         let share = match together.is_alone() {
             true => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
@@ -104,26 +104,34 @@ impl<T: Real> Products<T> {
         Ok(())
     }
 
-    /// The coarse space of nodes on which no contact acts: closed rows stay closed.
-    fn coarse_space(
-        &mut self,
-        a: SparseColMatRef<'_, usize, T>,
-        interface: &[usize],
-    ) -> Result<Option<CoarseSpace<T>>> {
+    /// Forms the coarse space of the nodes on which no contact acts: closed rows stay closed. Returns whether there is
+    /// one.
+    fn form_coarse_space(&mut self, a: SparseColMatRef<'_, usize, T>, interface: &[usize]) -> Result<bool> {
+        let Self { aggregates, space, .. } = self;
         let size = node_size(a.symbolic());
-        let aggregates = match &mut self.aggregates {
+        let aggregates = match aggregates {
             Some(aggregates) => aggregates,
             none => none.insert(Aggregates::find(a, size, interface.iter().copied())?),
         };
         if aggregates.count < 2 {
-            return Ok(None);
+            return Ok(false);
         }
-        let nodes = Nodes { size, count: a.ncols() / size, aggregate: &|node| aggregates.of(node) };
-        let near = |node: usize| {
-            (node * size..(node + 1) * size).flat_map(|dof| a.row_idx_of_col_raw(dof)).map(|other| other / size)
+        let space = match space {
+            Some(space) => space,
+            none => {
+                let of_node = |node: usize| node * size..(node + 1) * size;
+                let near = |node: usize| of_node(node).flat_map(|dof| a.row_idx_of_col_raw(dof)).map(|dof| dof / size);
+                none.insert(CoarseSpace::new((size, a.ncols() / size), |node| aggregates.of(node), near)?)
+            }
         };
         let identity = |_: usize, block: &mut [T]| block.iter_mut().step_by(size + 1).for_each(|x| *x = T::one());
-        CoarseSpace::new(&nodes, near, identity, |each| each_block(a, size, each))
+        space.form(identity, |product| {
+            for dof in 0..a.ncols() {
+                for (&row, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
+                    product.add_entry(row, dof, value);
+                }
+            }
+        })
     }
 
     /// Reads what this rank has. Returns the sums of the diagonals of A and of M over the free dofs that it owns.
@@ -182,9 +190,16 @@ impl<T: Real> Products<T> {
         (affordable, residual): (usize, f64),
         [forces, response]: [&mut [T]; 2],
     ) -> Result<Outcome> {
-        let Self { product, is_packed, inverse, expected, space, cg, answered, .. } = self;
+        let Self { product, is_packed, inverse, expected, space, deflates, cg, answered, .. } = self;
         answered.clear();
-        let mut body = OverRanks { product, is_packed: *is_packed, space: space.as_mut(), matrix, system, together };
+        let mut body = OverRanks {
+            product,
+            is_packed: *is_packed,
+            space: space.as_mut().filter(|_| *deflates),
+            matrix,
+            system,
+            together,
+        };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
         let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
