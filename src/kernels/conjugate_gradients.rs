@@ -437,6 +437,8 @@ fn iterate<T: Scalar, const B: usize, const W: usize>(
             ends[l].first = rho[l];
         }
     }
+    // ρ when the space was last removed from r.
+    let mut known = rho;
     let mut beta = [T::zero(); W];
     vectors.p.fill([T::zero(); W]);
     let is_met = |l: usize| rho[l] <= ends[l].tolerance.powi(2) * ends[l].first;
@@ -467,8 +469,8 @@ fn iterate<T: Scalar, const B: usize, const W: usize>(
                 })
             }
         };
-        let known = [&*vectors.p, &*vectors.t];
-        add(&mut curvature, substitute::<T, B, W>(lower, border.clone(), known, vectors.y));
+        let direction = [&*vectors.p, &*vectors.t];
+        add(&mut curvature, substitute::<T, B, W>(lower, border.clone(), direction, vectors.y));
         let mut steps = [0.0; W];
         for l in 0..W {
             if outcomes[l].is_some() {
@@ -495,6 +497,17 @@ fn iterate<T: Scalar, const B: usize, const W: usize>(
                 outcomes[l] = ends[l].outcome(steps[l], before[l], rho[l]);
                 beta[l] = T::of(rho[l] / before[l]);
             }
+        }
+        let is_open = |l: usize| outcomes[l].is_none();
+        let Some(deflation) = deflation.as_mut().filter(|_| (0..W).any(is_open)) else { continue };
+        // What rounding leaves of the space in r would not get smaller with it, and at last lead directions astray.
+        if (0..W).any(|l| rho[l] <= T::epsilon().value() * known[l]) {
+            restore::<T, B, W>(lower, border.clone(), vectors.r);
+            sweeps.each_part::<B, W>(vectors.lend(), |rows, own| restore::<T, B, W>(lower, rows, own.r));
+            deflation.start(vectors.r.as_flattened_mut(), vectors.x.as_flattened_mut());
+            rho = sweeps.each_part::<B, W>(vectors.lend(), |rows, own| eliminate::<T, B, W>(lower, rows, own.r));
+            add(&mut rho, eliminate::<T, B, W>(lower, border.clone(), vectors.r));
+            known = rho;
         }
     }
     outcomes.map(|outcome| outcome.unwrap_or(Outcome::Converged { iterations: 0 }))
@@ -523,6 +536,22 @@ fn eliminate<T: Scalar, const B: usize, const W: usize>(
         }
     }
     rho
+}
+
+/// Undoes [`eliminate`]: r ← (1 + L) r. Later rows come before earlier ones.
+#[inline(always)]
+fn restore<T: Scalar, const B: usize, const W: usize>(
+    lower: &Blocks<'_, T>,
+    Rows { range, first }: Rows,
+    r: &mut [Lanes<T, W>],
+) -> Lanes<f64, W> {
+    for row in range.rev() {
+        let sums = gather::<T, B, W>(lower, row, first, r);
+        for (r, sum) in r[(row - first) * B..][..B].iter_mut().zip(sums) {
+            *r = std::array::from_fn(|l| r[l] + sum[l]);
+        }
+    }
+    [0.0; W]
 }
 
 /// The next direction p, also in t.

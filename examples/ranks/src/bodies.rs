@@ -4,13 +4,13 @@ use crate::clock::Timed;
 use crate::engine::Engine;
 use crate::faults::{Fault, with_fault};
 use crate::partition::Part;
+use crate::parts::HyperelasticPart;
 use contact_dynamics::contact::Plane;
 use contact_dynamics::{
     CentralDifference, Composite, ContactConstraint, ContactLaw, LinearRows, LinearSystem, NodesOnObstacle, Result,
     Simulation, SimulationBuilder, System,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
-use crate::parts::HyperelasticPart;
 use contact_dynamics_scenes::solids::{Material, Solid};
 
 const MATERIAL: Material = Material { young: 100.0, poisson: 0.25, density: 1.0 };

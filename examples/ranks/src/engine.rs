@@ -5,10 +5,10 @@ use crate::faults::Fault;
 use crate::ffi::Input;
 #[cfg(feature = "petsc")]
 use crate::multigrid::Multigrid;
+use crate::parts::Cut;
 use crate::share::Share;
 use crate::solver::{Direct, Way};
 use contact_dynamics::{ConjugateGradients, LinearSolver};
-use crate::parts::Cut;
 use std::sync::Arc;
 
 /// A solver that spans ranks.

@@ -3,10 +3,10 @@
 
 use crate::faults::Fault;
 use crate::ffi::{Failed, Multigrid as Grids, Reason};
+use crate::parts::Cut;
 use crate::share::{Share, host};
 use contact_dynamics::faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use contact_dynamics::{Error, Factorization, LinearSolver, Result};
-use crate::parts::Cut;
 use std::sync::Arc;
 
 /// Where iterations end: the residual over the right-hand side. As tight as f64 lets it be, for solves take the place

@@ -2,11 +2,11 @@
 
 use crate::bodies::Blocks;
 use crate::ffi::World;
+use crate::parts::Cut;
 use crate::share::{Share, host};
 use contact_dynamics::faer::sparse::{Pair, SymbolicSparseColMat};
 use contact_dynamics::ranks::parts;
 use contact_dynamics::{Error, Result};
-use crate::parts::Cut;
 use std::sync::Arc;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
