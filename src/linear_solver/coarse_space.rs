@@ -88,7 +88,9 @@ impl Aggregates {
                 }
             }
             if is_free {
-                members.iter().for_each(|&node| of_node[node] = count);
+                for &node in &members {
+                    of_node[node] = count;
+                }
                 count += 1;
             }
         }
@@ -107,7 +109,9 @@ impl Aggregates {
             if joining.is_empty() {
                 break;
             }
-            joining.iter().for_each(|&(node, own)| of_node[node] = own);
+            for &(node, own) in &joining {
+                of_node[node] = own;
+            }
         }
         Ok(Self { of_node, count: count as usize })
     }
@@ -328,7 +332,9 @@ impl<T: Real> CoarseSpace<T> {
         factor.solve(weights)?;
         az.subtract(weights, r);
         let energy = right.iter().zip(&*weights).map(|(right, weight)| right.value() * weight.value()).sum();
-        weights.iter_mut().for_each(|weight| *weight = -*weight);
+        for weight in weights.iter_mut() {
+            *weight = -*weight;
+        }
         z.subtract(weights, x);
         Ok(energy)
     }

@@ -132,7 +132,7 @@ struct Matrix<T: Real> {
     values: Vec<T>,
     /// C⁻¹ of the diagonal blocks C Cᵀ.
     scaling: Vec<T>,
-    /// The coarse space, if one has been formed, what it needs of the pattern, and whether the matrix is worth it.
+    /// The coarse space, where its dofs are, and whether the present matrix uses it.
     deflation: Option<Deflation<T>>,
     deflates: bool,
     places: Option<Places>,

@@ -133,7 +133,7 @@ impl System<f64> for Strip {
         };
         for number in 0..self.links {
             let Link(vector, square) = self.link(u, number);
-            // Without that of pressure, which would make the tangent indefinite: links may buckle.
+            // Pressed links may buckle: their geometric stiffness would make the tangent indefinite.
             let geometric = (AXIAL * (square.sqrt() - self.length) / self.length / square.sqrt()).max(0.0);
             let material = (AXIAL / self.length - geometric) / square;
             add_link(

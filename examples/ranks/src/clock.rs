@@ -203,7 +203,9 @@ impl Factorization<f64> for Timed<Inner> {
         self.solver(|part| part.factorize(a))
     }
     fn solve(&mut self, rhs: &mut [f64]) -> Result<()> {
-        self.solver(|part| part.solve(rhs))
+        let solved = self.solver(|part| part.solve(rhs));
+        self.clock.iterated(self.part.iterations());
+        solved
     }
     fn release(&mut self) {
         self.part.release();

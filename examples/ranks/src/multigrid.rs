@@ -97,7 +97,6 @@ impl Factorization<f64> for Factor {
             own.extend(share.own_dofs().map(|dof| column[dof]));
             let ended = grids.solve(own).map_err(failed)?;
             *iterations = ended.iterations.max(*iterations);
-            share.clock.iterated(ended.iterations);
             // The same on all ranks.
             match ended.reason {
                 None => {}

@@ -93,7 +93,7 @@ impl<T: Real> Products<T> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = wanted.ceil() as usize;
         self.expected = if wanted.is_finite() { count } else { usize::MAX };
-        // Over ranks all entries are read: what is far from contact on this rank may be near it on another.
+        // Over ranks products read all entries: a dof far from contact on this rank may be near it on another.
         let share = match together.is_alone() {
             true if !self.deflates => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
             _ => 1.0,
