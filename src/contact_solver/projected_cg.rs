@@ -30,8 +30,8 @@ use std::ops::Range;
 /// What memory is asked for.
 const WHAT: &str = "a contact problem without W";
 
-/// The body of a contact problem: its matrix A, symmetric and positive definite. Over ranks vectors are correct at every
-/// dof of a rank, and results are the same on all to the bit.
+/// The body of a contact problem: its matrix A, symmetric and positive definite. Over ranks vectors are correct at
+/// every dof of a rank, and results are the same on all to the bit.
 pub(crate) trait Body<T> {
     /// Writes A x to y. x is zero farther from the dofs of the rows than `reach`, the number of products with which it
     /// can get there.

@@ -230,8 +230,8 @@ pub(crate) struct CoarseSpace<T> {
 }
 
 impl<T: Real> CoarseSpace<T> {
-    /// For a matrix in blocks of `size`² and the aggregate of each node. `near` lists the nodes that couple with a node,
-    /// itself among them.
+    /// For a matrix in blocks of `size`² and the aggregate of each node. `near` lists the nodes that couple with a
+    /// node, itself among them.
     pub(crate) fn new<I: Iterator<Item = usize>>(
         (size, nodes): (usize, usize),
         aggregate: impl Fn(usize) -> Option<usize>,
@@ -268,8 +268,8 @@ impl<T: Real> CoarseSpace<T> {
         Ok(Self { z, az, pointers, rows, values, factor, weights, partial })
     }
 
-    /// Forms all for a matrix. `z` writes the block of Z of a node, and `matrix` adds the entries of the matrix. Returns
-    /// whether Zᵀ A Z is definite.
+    /// Forms all for a matrix. `z` writes the block of Z of a node, and `matrix` adds the entries of the matrix.
+    /// Returns whether Zᵀ A Z is definite.
     pub(crate) fn form(
         &mut self,
         z: impl Fn(usize, &mut [T]),

@@ -27,13 +27,14 @@ use std::ops::Range;
 /// the Courant number below which they are faster than the sweeps over the factor of [`Cholesky`](super::Cholesky).
 /// They need the memory of half the matrix; factors of solids need ten to a hundred times as much.
 ///
-/// At Courant numbers of about eight and more, for matrices whose condition number is estimated above 40, directions are
-/// kept A-orthogonal to a coarse space, the translations of aggregates of about 125 nodes (deflation: Nicolaides, SIAM J.
-/// Numer. Anal. 24, 1987). Twice the Courant number then takes 1.3 to 1.7 times as many iterations instead of twice as
-/// many. The space needs half as much memory again.
+/// At Courant numbers of about eight and more, for matrices whose condition number is estimated above 40, directions
+/// are kept A-orthogonal to a coarse space, the translations of aggregates of about 125 nodes (deflation: Nicolaides,
+/// SIAM J. Numer. Anal. 24, 1987). Twice the Courant number then takes 1.3 to 1.7 times as many iterations instead of
+/// twice as many. The space needs half as much memory again.
 ///
-/// Every solve starts from zero and uses no data of earlier ones. Steps solve for the increment from the predicted
-/// motion, so zero is the prediction itself, and a run resumed from a clone is bitwise the same.
+/// Every solve starts from zero, or in the coarse space, and uses no data of earlier ones. Steps solve for the
+/// increment from the predicted motion, so zero is the prediction itself, and a run resumed from a clone is bitwise the
+/// same.
 ///
 /// The residual is measured in the norm of the preconditioner, √(rᵀ P⁻¹ r), relative to the right-hand side. This
 /// does not depend on the units of the dofs and is close to the error in the energy norm of A. An iteration ends at

@@ -12,10 +12,10 @@ use std::sync::Arc;
 /// [`ConjugateGradients`] for a matrix that is spread over ranks, made by [`ConjugateGradients::over_ranks`]: a solver
 /// that needs no other package.
 ///
-/// Its preconditioner is the diagonal of the matrix (Jacobi), which does not depend on the partition: any number of ranks
-/// gives the same result up to rounding. It takes about twice as many iterations as `ConjugateGradients` without ranks.
-/// An iteration costs a product with the rows of the rank, one exchange of a vector and two sums. The residual is
-/// measured in the norm of the inverse diagonal.
+/// Its preconditioner is the diagonal of the matrix (Jacobi), which does not depend on the partition: any number of
+/// ranks gives the same result up to rounding. It takes about twice as many iterations as `ConjugateGradients` without
+/// ranks. An iteration costs a product with the rows of the rank, one exchange of a vector and two sums. The residual
+/// is measured in the norm of the inverse diagonal.
 ///
 /// ```
 /// use contact_dynamics::faer::sparse::{SparseColMat, Triplet};

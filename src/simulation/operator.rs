@@ -346,8 +346,8 @@ impl<T: Real> Operator<T> {
         self.factor.iterations() > 0
     }
 
-    /// Solves a contact problem by products with A, to a residual, unless forming W is less work or the only way. Leaves
-    /// the forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
+    /// Solves a contact problem by products with A, to a residual, unless forming W is less work or the only way.
+    /// Leaves the forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
     pub(crate) fn solve_by_products(
         &mut self,
         (system, together): (&mut dyn System<T>, &Together<T>),

@@ -165,8 +165,8 @@ impl System<f64> for Strip {
     }
 }
 
-/// A strip of some links and a thickness, bent to a half circle with straight ends and let go between plates. Returns the
-/// force on a plate and the largest curvature in the end, each over its value for the distance of the middle lines.
+/// A strip of some links and a thickness, bent to a half circle with straight ends and let go between plates. Returns
+/// the force on a plate and the largest curvature in the end, each over its value for the distance of the middle lines.
 fn folded(links: usize, thickness: f64) -> [f64; 2] {
     const WHOLE: f64 = PI + 3.0;
     let (length, distance) = (WHOLE / links as f64, 2.0);
@@ -207,9 +207,9 @@ fn folded(links: usize, thickness: f64) -> [f64; 2] {
 /// ∫ √sin θ dθ over a quarter of a turn.
 const FOLD: f64 = 1.198_140_234_735_592;
 
-/// Where the strip leaves a plate it has no curvature, and the plate's force P is all that bends it: with the direction θ
-/// from the plate ½ EI κ² = P sin θ, and half of the distance of the middle lines is ∫ sin θ/κ dθ. So κ at the apex is
-/// 2 · 1.198 over that distance, as in the bending of fibers between plates (Matthewson, Kurkjian and Gulati, J. Am.
+/// Where the strip leaves a plate it has no curvature, and the plate's force P is all that bends it: with the direction
+/// θ from the plate ½ EI κ² = P sin θ, and half of the distance of the middle lines is ∫ sin θ/κ dθ. So κ at the apex
+/// is 2 · 1.198 over that distance, as in the bending of fibers between plates (Matthewson, Kurkjian and Gulati, J. Am.
 /// Ceram. Soc. 69, 1986), and P = ½ EI κ².
 #[test]
 fn a_strip_folded_between_plates_is_an_elastica() {

@@ -221,8 +221,8 @@ fn jumps_of_hundreds_of_rows() {
     }
 }
 
-/// Newton's method factorizes in every iteration, and W takes a solve for each of 289 rows after each: products with the
-/// tangent are chosen.
+/// Newton's method factorizes in every iteration, and W takes a solve for each of 289 rows after each: products with
+/// the tangent are chosen.
 #[test]
 fn responses_that_cannot_be_kept_count_as_work() {
     let solid = Solid::block([1.6, 1.6, 0.3], [16, 16, 3], MATERIAL);

@@ -43,8 +43,8 @@ pub(super) struct Products<T> {
 const LOOKS: usize = 40;
 const PATIENCE: usize = 3;
 
-/// Products up to which the iteration is chosen without a coarse space: with more, as for modal coordinates, their number
-/// is not well known.
+/// Products up to which the iteration is chosen without a coarse space: with more, as for modal coordinates, their
+/// number is not well known.
 const MANY_PRODUCTS: usize = 64;
 
 /// Products that are tried in any case.
@@ -183,8 +183,8 @@ impl<T: Real> Products<T> {
         self.answered.clear();
     }
 
-    /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves the forces
-    /// Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
+    /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves the
+    /// forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
     pub(super) fn solve(
         &mut self,
         (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
