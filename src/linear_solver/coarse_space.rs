@@ -180,11 +180,12 @@ impl<T: Real> Rows<T> {
         Ok(rows)
     }
 
-    /// The block of a node and an aggregate, stored column by column.
-    fn block(&mut self, node: usize, aggregate: usize) -> &mut [T] {
+    /// The block of a node and an aggregate, stored column by column, if there is one.
+    fn block(&mut self, node: usize, aggregate: usize) -> Option<&mut [T]> {
         let range = self.range(node);
-        let at = range.start + self.columns[range].partition_point(|&own| (own as usize) < aggregate);
-        &mut self.values[at * self.size * self.size..][..self.size * self.size]
+        let at =
+            range.start + self.columns[range.clone()].binary_search_by(|&own| (own as usize).cmp(&aggregate)).ok()?;
+        Some(&mut self.values[at * self.size * self.size..][..self.size * self.size])
     }
 
     /// `x −= A weights`.
@@ -278,8 +279,8 @@ impl<T: Real> CoarseSpace<T> {
         let Self { z: own, az, pointers, rows, values, factor, weights, .. } = self;
         let size = own.size;
         for node in 0..own.nodes() {
-            if let Some(aggregate) = own.only(node) {
-                z(node, own.block(node, aggregate));
+            if let Some(block) = own.only(node).and_then(|aggregate| own.block(node, aggregate)) {
+                z(node, block);
             }
         }
         az.values.fill(T::zero());
@@ -369,7 +370,8 @@ impl<T: Real> Product<'_, T> {
         let Some(aggregate) = z.only(column) else { return };
         let size = z.size;
         let of_z = &z.values[z.pointers[column] * size * size..][..size * size];
-        let sums = product.block(row, aggregate);
+        // Zeros may be stored on one side of the diagonal only.
+        let Some(sums) = product.block(row, aggregate) else { return };
         for c in 0..size {
             for k in 0..size {
                 for r in 0..size {
@@ -385,7 +387,7 @@ impl<T: Real> Product<'_, T> {
         let size = z.size;
         let Some(aggregate) = z.only(column / size) else { return };
         let of_z = &z.values[z.pointers[column / size] * size * size..][..size * size];
-        let sums = product.block(row / size, aggregate);
+        let Some(sums) = product.block(row / size, aggregate) else { return };
         for c in 0..size {
             sums[c * size + row % size] += value * of_z[c * size + column % size];
         }
