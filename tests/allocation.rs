@@ -34,6 +34,7 @@ fn steps_do_not_allocate() {
     large_motion();
     bodies_apart();
     iterations();
+    long_steps();
     frames();
     assemblies();
     modes_propagated();
@@ -403,6 +404,26 @@ fn iterations() {
     }
     (0..2).for_each(|_| run.step().unwrap());
     assert_steps_allocate_nothing(&mut run, 100, 4, "conjugate gradients");
+}
+
+/// A heavy block at large strains on a floor, in steps of Courant number 20: a coarse space for every tangent.
+fn long_steps() {
+    let block = Solid::block([1.0, 1.0, 0.75], [8, 8, 6], MATERIAL);
+    let bottom: Vec<usize> = (0..block.nodes.len()).filter(|&n| block.nodes[n][2] < 0.01).collect();
+    let floor = Plane::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+    let contact = NodesOnObstacle::new(floor, &block.nodes, &block.node_dofs(), &bottom).unwrap();
+    let weight = 1e-3 * MATERIAL.young / MATERIAL.density;
+    let body = Hyperelastic::new(&block, Law::NeoHookean).gravity([0.0, 0.0, -weight]);
+    let mut run = Simulation::builder(body, GeneralizedAlpha::default(), 20.0 * 0.125 / MATERIAL.wave_speed())
+        .constraint(contact)
+        .linear_solver(ConjugateGradients::default())
+        .build()
+        .unwrap();
+    (0..4).for_each(|_| run.step().unwrap());
+    let before = *run.statistics();
+    assert_steps_allocate_nothing(&mut run, 10, 0, "long steps");
+    let after = run.statistics();
+    assert!(after.contact_products > before.contact_products && after.newton_iterations > before.newton_iterations);
 }
 
 /// A frame whose nodes close one by one, and are held one by one.
