@@ -362,7 +362,8 @@ impl<T: Real> Operator<T> {
         if data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
             return Ok(None);
         }
-        self.read_products((system, together), h, at)?;
+        let may_deflate = assembly == Assembly::Never || self.iterates();
+        self.read_products((system, together), (h, may_deflate), at)?;
         let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
@@ -399,7 +400,7 @@ impl<T: Real> Operator<T> {
     fn read_products(
         &mut self,
         (system, together): (&mut dyn System<T>, &Together<T>),
-        h: f64,
+        (h, may_deflate): (f64, bool),
         at: At<'_, T>,
     ) -> Result<()> {
         if self.products.as_ref().is_some_and(|products| products.is_current) {
@@ -411,7 +412,7 @@ impl<T: Real> Operator<T> {
             Some(products) => products,
             none => none.insert(Box::new(together.agree(Products::new(matrix, system, &self.interface))?)),
         };
-        products.read((matrix, &self.interface), (system, together), h)?;
+        products.read((matrix, &self.interface), (system, together), (h, may_deflate))?;
         if products.is_packed && !self.varies() {
             self.matrix.free_values();
         }

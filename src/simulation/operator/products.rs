@@ -43,8 +43,8 @@ pub(super) struct Products<T> {
 const LOOKS: usize = 40;
 const PATIENCE: usize = 3;
 
-/// Products up to which the iteration is chosen without a coarse space: with more, as for modal coordinates, their
-/// number is not well known.
+/// Products up to which the iteration is chosen: with more, as at large Courant numbers and for modal coordinates,
+/// their number is not well known.
 const MANY_PRODUCTS: usize = 64;
 
 /// Products that are tried in any case.
@@ -71,12 +71,12 @@ impl<T: Real> Products<T> {
         })
     }
 
-    /// Reads a matrix.
+    /// Reads a matrix. A coarse space is of use only where products are the only way.
     pub(super) fn read(
         &mut self,
         (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
         (system, together): (&dyn System<T>, &Together<T>),
-        h: f64,
+        (h, may_deflate): (f64, bool),
     ) -> Result<()> {
         let own = self.read_own(matrix, (system, together));
         let [whole, mass] = together.sum(own)?;
@@ -84,10 +84,10 @@ impl<T: Real> Products<T> {
         together.share(&mut self.inverse)?;
         // A smooth motion has the mass of the diagonal without its stiffness; the stiffest motion has twice both.
         let condition = (2.0 * whole / (matrix.inertia(h) * mass)).max(1.0);
-        self.deflates =
-            together.is_alone() && condition > WORTHWHILE && self.form_coarse_space(matrix.view(system), interface)?;
-        // With a coarse space twice the Courant number takes at most 1.4 times as many products.
-        let condition = if self.deflates { (WORTHWHILE * condition).sqrt() } else { condition };
+        self.deflates = may_deflate
+            && together.is_alone()
+            && condition > WORTHWHILE
+            && self.form_coarse_space(matrix.view(system), interface)?;
         let digits = (2.0 / projected_residual::<T>().value()).ln();
         let wanted = 0.5 * condition.sqrt() * digits;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
@@ -95,12 +95,11 @@ impl<T: Real> Products<T> {
         self.expected = if wanted.is_finite() { count } else { usize::MAX };
         // Over ranks products read all entries: a dof far from contact on this rank may be near it on another.
         let share = match together.is_alone() {
-            true if !self.deflates => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
-            _ => 1.0,
+            true => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
+            false => 1.0,
         };
-        let of_space = self.space.as_ref().filter(|_| self.deflates).map_or(0, CoarseSpace::stored_values);
         let a = matrix.view(system);
-        let sizes = [share * a.val().len().midpoint(a.ncols()) as f64 + of_space as f64, a.ncols() as f64];
+        let sizes = [share * a.val().len().midpoint(a.ncols()) as f64, a.ncols() as f64];
         [self.entries, self.dofs] = together.max(Ok(sizes))?;
         self.is_current = true;
         self.begin();
@@ -167,8 +166,7 @@ impl<T: Real> Products<T> {
         let of_one = self.entries + 8.0 * self.dofs + (8 * entries) as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = (with_w / of_one) as usize;
-        let most = if self.deflates { usize::MAX } else { MANY_PRODUCTS };
-        (self.expected <= count.min(most)).then_some(count.max(FEW_PRODUCTS))
+        (self.expected <= count.min(MANY_PRODUCTS)).then_some(count.max(FEW_PRODUCTS))
     }
 
     /// The matrix is another.
