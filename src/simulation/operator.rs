@@ -362,9 +362,8 @@ impl<T: Real> Operator<T> {
         if data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
             return Ok(None);
         }
-        let may_deflate = assembly == Assembly::Never || self.iterates();
-        self.read_products((system, together), (h, may_deflate), at)?;
         let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
+        self.read_products((system, together), (h, assembly == Assembly::Never || iterates), at)?;
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
         if assembly == Assembly::Automatic && !iterates {

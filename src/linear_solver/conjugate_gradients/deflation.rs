@@ -16,8 +16,6 @@ const LARGEST: usize = 9;
 pub(super) struct Deflation<T: Real> {
     space: CoarseSpace<T>,
     upper: Rows<T>,
-    /// Whether it can be used.
-    pub(super) is_definite: bool,
     /// Why a solve has no result.
     failure: Option<Error>,
 }
@@ -42,8 +40,8 @@ fn transposed_factor<T: Real>(size: usize, inverse: &[T], block: &mut [T]) {
 }
 
 impl<T: Real> Matrix<T> {
-    /// Forms the coarse space of a matrix that has been scaled.
-    pub(super) fn deflate(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
+    /// Forms the coarse space of a matrix that has been scaled. Returns whether there is one.
+    pub(super) fn form_coarse_space(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<bool> {
         let Self { size, parts, pointers, columns, values, scaling, places, deflation, .. } = self;
         let (size, count) = (*size, pointers.len() - 1);
         let places = match places {
@@ -55,7 +53,7 @@ impl<T: Real> Matrix<T> {
             }
         };
         if places.aggregates.count < 2 {
-            return Ok(());
+            return Ok(false);
         }
         let deflation = match deflation {
             Some(deflation) => deflation,
@@ -68,7 +66,7 @@ impl<T: Real> Matrix<T> {
                 };
                 let space = CoarseSpace::new((size, count), aggregate, near)?;
                 let upper = space.rows()?;
-                none.insert(Deflation { space, upper, is_definite: false, failure: None })
+                none.insert(Deflation { space, upper, failure: None })
             }
         };
         let z = |place: usize, block: &mut [T]| transposed_factor(size, &scaling[place * size * size..], block);
@@ -94,9 +92,9 @@ impl<T: Real> Matrix<T> {
                 }
             }
         };
-        deflation.is_definite = deflation.space.form(z, |product| add(true, product))?;
+        let is_definite = deflation.space.form(z, |product| add(true, product))?;
         deflation.space.multiply(&mut deflation.upper, |product| add(false, product));
-        Ok(())
+        Ok(is_definite)
     }
 }
 
