@@ -29,7 +29,7 @@ impl Grid {
     }
 
     /// Places of all nodes in the grid, in the order of their numbers.
-    fn places(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
+    pub(crate) fn places(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
         let [x, y, z] = self.nodes_along();
         (0..x).flat_map(move |i| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k])))
     }

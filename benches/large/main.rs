@@ -7,8 +7,11 @@
 //!   factor; the figure goes to `target/large/courant.svg`.
 //! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
 //! - `-- explicit [cells a side]…` (default 60 and 100): the slab by CD-Lagrange, beside its steps without contact.
+//! - `-- picture [cells a side]` (default 100): the slab some time after first contact, in `target/large/slab.vtu`, which
+//!   `picture.py` draws with ParaView.
 
 mod grid;
+mod picture;
 
 use contact_dynamics::contact::GapFunction;
 use contact_dynamics::contact_solver::Assembly;
@@ -39,6 +42,8 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         Ok(exact(&Arguments::read(&[46], &[6]))?)
     } else if is_given("explicit") {
         Ok(explicit(&Arguments::read(&[60, 100], &[6]))?)
+    } else if is_given("picture") {
+        picture(&Arguments::read(&[100], &[6]))
     } else {
         Ok(slabs(&Arguments::read(&[20, 40, 60, 80, 100, 130], &[6]))?)
     }
@@ -299,6 +304,22 @@ fn exact(arguments: &Arguments) -> Result<()> {
                 apart / largest.max(f64::MIN_POSITIVE)
             );
         }
+    }
+    Ok(())
+}
+
+/// Writes the slab when waves have gone through three quarters of its thickness.
+fn picture(arguments: &Arguments) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let folder = std::path::Path::new("target/large");
+    std::fs::create_dir_all(folder)?;
+    for &cells in &arguments.sizes {
+        let grid = slab(cells);
+        let mut run = falling(&grid, step(&grid, 1.0))?.linear_solver(ConjugateGradients::default()).build()?;
+        for _ in 0..2 + 3 * grid.cells[2] / 4 {
+            run.step()?;
+        }
+        picture::write(&folder.join("slab.vtu"), &grid, &run)?;
+        println!("{} dofs, {} closed: target/large/slab.vtu", grid.dofs(), closed(&run));
     }
     Ok(())
 }

@@ -363,13 +363,13 @@ impl<T: Real> Operator<T> {
             return Ok(None);
         }
         let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
-        self.read_products((system, together), (h, assembly == Assembly::Never || iterates), at)?;
+        self.read_products((system, together), h, at)?;
         let Some(products) = &mut self.products else { return Ok(None) };
         let mut affordable = usize::MAX;
         if assembly == Assembly::Automatic && !iterates {
             let entries = rows.iter().map(|&row| g.located(row).count()).sum();
             let with_w = responses + self.responses.work((rows.len(), entries), data.sets.len() < rows.len());
-            match products.affordable(entries, with_w) {
+            match products.affordable(entries, residual, with_w) {
                 Some(count) => affordable = count,
                 None => return Ok(None),
             }
@@ -399,7 +399,7 @@ impl<T: Real> Operator<T> {
     fn read_products(
         &mut self,
         (system, together): (&mut dyn System<T>, &Together<T>),
-        (h, may_deflate): (f64, bool),
+        h: f64,
         at: At<'_, T>,
     ) -> Result<()> {
         if self.products.as_ref().is_some_and(|products| products.is_current) {
@@ -411,7 +411,7 @@ impl<T: Real> Operator<T> {
             Some(products) => products,
             none => none.insert(Box::new(together.agree(Products::new(matrix, system, &self.interface))?)),
         };
-        products.read((matrix, &self.interface), (system, together), (h, may_deflate))?;
+        products.read((matrix, &self.interface), (system, together), h)?;
         if products.is_packed && !self.varies() {
             self.matrix.free_values();
         }

@@ -81,7 +81,7 @@ impl<T: Real> Correction<'_, T> {
         self.pose(rows, (jump, pressed), share);
         let mut solved = self.solve_posed();
         // Rows that contradict each other by less than their errors are solved with these errors as tolerance.
-        for error_of in [Self::rounding_of_gap, Self::share_of_rate] {
+        for error_of in [Self::rounding_of_gap, Self::share_of_rate, Self::acceleration_of_turn] {
             if !matches!(solved, Err(Error::ContradictoryContacts { .. } | Error::Contact { .. })) {
                 break;
             }
@@ -152,6 +152,15 @@ impl<T: Real> Correction<'_, T> {
     fn share_of_rate(&self, row: usize, jump: Jump) -> T {
         let (values, own) = jump.terms(self.new, &self.buffers.readings.rates[row]);
         share_of_rounding::<T>().sqrt() * (self.g.magnitude(row, values) + own.abs())
+    }
+
+    /// The acceleration of a gap along a row that turns. Where two nodes face each other their rows are the same, but
+    /// not these accelerations: the facets turn at different rates, and the nodes slide along them.
+    fn acceleration_of_turn(&self, row: usize, jump: Jump) -> T {
+        match jump {
+            Jump::Velocity => T::zero(),
+            Jump::Acceleration => jump.terms(self.new, &self.buffers.readings.rates[row]).1.abs(),
+        }
     }
 
     /// Reads the slip rates that the constraints add.

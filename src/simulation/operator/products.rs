@@ -43,12 +43,17 @@ pub(super) struct Products<T> {
 const LOOKS: usize = 40;
 const PATIENCE: usize = 3;
 
-/// Products up to which the iteration is chosen: with more, as at large Courant numbers and for modal coordinates,
-/// their number is not well known.
+/// Products up to which the iteration is chosen without a coarse space: with more, as for modal coordinates, their
+/// number is not well known.
 const MANY_PRODUCTS: usize = 64;
 
 /// Products that are tried in any case.
 const FEW_PRODUCTS: usize = 24;
+
+/// Digits that conjugate gradients gain until this residual, natural ones, in the estimate of their convergence.
+fn digits(residual: f64) -> f64 {
+    (2.0 / residual).ln()
+}
 
 impl<T: Real> Products<T> {
     /// For contact that acts on some dofs.
@@ -71,12 +76,12 @@ impl<T: Real> Products<T> {
         })
     }
 
-    /// Reads a matrix. A coarse space is of use only where products are the only way.
+    /// Reads a matrix.
     pub(super) fn read(
         &mut self,
         (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
         (system, together): (&dyn System<T>, &Together<T>),
-        (h, may_deflate): (f64, bool),
+        h: f64,
     ) -> Result<()> {
         let own = self.read_own(matrix, (system, together));
         let [whole, mass] = together.sum(own)?;
@@ -84,22 +89,22 @@ impl<T: Real> Products<T> {
         together.share(&mut self.inverse)?;
         // A smooth motion has the mass of the diagonal without its stiffness; the stiffest motion has twice both.
         let condition = (2.0 * whole / (matrix.inertia(h) * mass)).max(1.0);
-        self.deflates = may_deflate
-            && together.is_alone()
-            && condition > WORTHWHILE
-            && self.form_coarse_space(matrix.view(system), interface)?;
-        let digits = (2.0 / projected_residual::<T>().value()).ln();
-        let wanted = 0.5 * condition.sqrt() * digits;
+        self.deflates =
+            together.is_alone() && condition > WORTHWHILE && self.form_coarse_space(matrix.view(system), interface)?;
+        // With a coarse space twice the Courant number takes some 1.3 times as many products.
+        let condition = if self.deflates { WORTHWHILE * (condition / WORTHWHILE).cbrt() } else { condition };
+        let wanted = 0.5 * condition.sqrt() * digits(projected_residual::<T>().value());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = wanted.ceil() as usize;
         self.expected = if wanted.is_finite() { count } else { usize::MAX };
         // Over ranks products read all entries: a dof far from contact on this rank may be near it on another.
         let share = match together.is_alone() {
-            true => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
-            false => 1.0,
+            true if !self.deflates => self.product.mean_share(self.expected.min(MANY_PRODUCTS)),
+            _ => 1.0,
         };
+        let of_space = self.space.as_ref().filter(|_| self.deflates).map_or(0, CoarseSpace::stored_values);
         let a = matrix.view(system);
-        let sizes = [share * a.val().len().midpoint(a.ncols()) as f64, a.ncols() as f64];
+        let sizes = [share * a.val().len().midpoint(a.ncols()) as f64 + of_space as f64, a.ncols() as f64];
         [self.entries, self.dofs] = together.max(Ok(sizes))?;
         self.is_current = true;
         self.begin();
@@ -161,12 +166,18 @@ impl<T: Real> Products<T> {
         Ok([whole, mass])
     }
 
-    /// Products to be tried for rows with so many entries, if the work with W (in multiplications) is no less.
-    pub(super) fn affordable(&self, entries: usize, with_w: f64) -> Option<usize> {
+    /// Products to be tried for a problem to a residual, of rows with so many entries, if the work with W (in
+    /// multiplications) is no less. A stage of which a problem was solved so goes on.
+    pub(super) fn affordable(&self, entries: usize, residual: f64, with_w: f64) -> Option<usize> {
+        if !self.answered.is_empty() {
+            return Some(usize::MAX);
+        }
         let of_one = self.entries + 8.0 * self.dofs + (8 * entries) as f64;
+        let expected = self.expected as f64 * digits(residual) / digits(projected_residual::<T>().value());
+        let most = if self.deflates { usize::MAX } else { MANY_PRODUCTS };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive; saturates if it is huge
         let count = (with_w / of_one) as usize;
-        (self.expected <= count.min(MANY_PRODUCTS)).then_some(count.max(FEW_PRODUCTS))
+        (self.expected <= most && expected <= count as f64).then_some(count.max(FEW_PRODUCTS))
     }
 
     /// The matrix is another.

@@ -23,6 +23,8 @@ const LONG: usize = 12;
 pub(crate) struct Miss {
     /// Difference of the gaps, relative to their change by d.
     pub(crate) gap: f64,
+    /// The same, relative to the displacement that contact undoes if this is larger, as in bodies at rest.
+    pub(crate) undone: f64,
     /// Difference of the forces, relative to the forces.
     pub(crate) force: f64,
 }
@@ -46,24 +48,30 @@ impl Worst {
 
 impl Miss {
     /// Before the first solution.
-    pub(crate) const ALL: Self = Self { gap: f64::INFINITY, force: f64::INFINITY };
+    pub(crate) const ALL: Self = Self { gap: f64::INFINITY, undone: f64::INFINITY, force: f64::INFINITY };
 
     pub(crate) fn largest(self) -> f64 {
         self.gap.max(self.force)
     }
 
     /// Whether the iteration may end after some `linearizations`: the miss is within rounding; or small and no longer
-    /// decreasing; or rows alternate. `before` and `earlier` are the misses of the last two linearizations.
+    /// decreasing; or rows alternate; or it is small after the last one. `before` and `earlier` are the misses of the
+    /// last two linearizations.
     pub(crate) fn has_converged<T: Real>(self, linearizations: usize, [before, earlier]: [Self; 2]) -> bool {
         let fit = rounding(T::one()).value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let stalls =
-            within(SAME_ROWS, SAME_ROWS) && (now > 0.25 * before.largest() || linearizations == LINEARIZATIONS);
-        let alternates = linearizations > LONG
-            && within(ALTERNATING_GAPS, ALTERNATING_FORCES)
-            && now >= ALTERNATION * earlier.largest();
-        now <= fit || stalls || alternates
+        let stalls = within(SAME_ROWS, SAME_ROWS) && now > 0.25 * before.largest();
+        let alternates = now >= ALTERNATION * earlier.largest();
+        let may_end = match linearizations {
+            // Where bodies are at rest gaps do not change; what contact undoes is left as a scale.
+            LINEARIZATIONS => {
+                let force = if alternates { ALTERNATING_FORCES } else { ALTERNATING_GAPS };
+                self.undone <= ALTERNATING_GAPS.max(fit) && self.force <= force.max(fit)
+            }
+            _ => linearizations > LONG && alternates && within(ALTERNATING_GAPS, ALTERNATING_FORCES),
+        };
+        now <= fit || stalls || may_end
     }
 }
 

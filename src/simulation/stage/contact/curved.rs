@@ -137,15 +137,17 @@ impl<T: Real> StageSolve<'_, '_, T> {
         for row in own.chain(self.constraints.tangents().all()) {
             forces.interface_scatter(row, trial.lambda_raw[row], &mut interface.response);
         }
-        let mut worst = ((0, "the gap"), 0.0_f64);
+        let (mut worst, mut undone) = (((0, "the gap"), 0.0_f64), 0.0_f64);
         for row in (0..self.constraints.len()).filter(|&row| self.contact.rows.massless.contains(row)) {
-            let share = self.gap_miss(row);
+            let [share, of_undone] = self.gap_miss(row);
+            undone = undone.max(of_undone);
             if share > worst.1 {
                 worst = ((row, "the gap"), share);
             }
         }
         for row in self.constraints.tangents().all() {
             let share = self.slip_miss(row);
+            undone = undone.max(share);
             if share > worst.1 {
                 worst = ((self.constraints.tangents().owner(row), "the slip"), share);
             }
@@ -154,14 +156,14 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let change = interface.response.iter().zip(&interface.forces).map(|(&new, &old)| (new - old).value().powi(2));
         let size = interface.forces.iter().map(|force| force.value().powi(2)).sum::<f64>();
         let force = if size > 0.0 { (change.sum::<f64>() / size).sqrt() } else { 0.0 };
-        let miss = Miss { gap: worst.1, force };
+        let miss = Miss { gap: worst.1, undone, force };
         rows.curved.worst = Worst::of(miss, worst.0);
         Ok(miss)
     }
 
-    /// The difference between the gap of a row and the gap solved for, beyond its tolerance and relative to the change
-    /// of the gap by d.
-    fn gap_miss(&self, row: usize) -> f64 {
+    /// The difference between the gap of a row and the gap solved for, beyond its tolerance, relative to the change of
+    /// the gap by d, and to the displacement that contact undoes if this is larger.
+    fn gap_miss(&self, row: usize) -> [f64; 2] {
         let ContactWork { rows, trial, interface, .. } = &*self.contact;
         let (forces, law) = (rows.curved.forces(self.g), self.constraints.law(row));
         let weight = rows.weight[row].abs();
@@ -173,13 +175,14 @@ impl<T: Real> StageSolve<'_, '_, T> {
             scale = scale.max(y.abs());
         }
         // Rounding of the displacement undone by the force, which no other term contains at zero gap and coordinates.
-        tolerance += rounding(weight * forces.interface_magnitude(row, &interface.free));
+        let undone = weight * forces.interface_magnitude(row, &interface.free);
+        tolerance += rounding(undone);
         let miss = match trial.lambda_raw[row] > T::zero() || law.is_equality() {
             true => (y - rows.curved.predicted[row]).abs(),
             false if rows.state[row].is_enabled() => -y,
             false => T::zero(),
         };
-        share_beyond(miss, tolerance, scale)
+        [scale, scale.max(undone)].map(|scale| share_beyond(miss, tolerance, scale))
     }
 
     /// The difference between a slip of a closed contact and the slip solved for, beyond its tolerance and relative to
