@@ -160,6 +160,10 @@ pub(crate) const ALTERNATING_FORCES: f64 = 0.1;
 /// and the difference is at least this share of the difference two linearizations before.
 pub(crate) const ALTERNATION: f64 = 0.999;
 
+/// After the last linearization of a stage forces may differ by this share, if gaps differ by at most
+/// [`ALTERNATING_GAPS`] of the displacement that contact undoes.
+pub(crate) const LAST_FORCES: f64 = 1e-3;
+
 /// Displacements of dofs without mass have converged if the largest increment is this share of the first one.
 pub(crate) const STATIC_INCREMENT: f64 = 1e-9;
 

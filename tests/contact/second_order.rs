@@ -2,7 +2,7 @@
 
 use super::mortar::{blocks, shaken};
 use contact_dynamics::contact::{ContactConstraint, Contacts, Facet, Mortar, Surface, SurfaceSettings, Tie};
-use contact_dynamics::{Composite, Error, Simulation, verify};
+use contact_dynamics::{Composite, Simulation, verify};
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::second_order::{Family, SecondOrderStack, linear};
@@ -51,20 +51,15 @@ fn the_patch_test_in_three_dimensions() {
 }
 
 /// Nodes that are not in the middle of their sides: pressure is constant up to the size of elements. With 27 nodes and
-/// the upper body as the slave, rows carry forces so uneven that they alternate; this step is refused.
+/// the upper body as the slave, rows carry forces so uneven that they alternate, while the bodies come to rest.
 #[test]
 fn skewed_sides_of_second_order_pass_the_patch_test_nearly() {
     let skew = |[x, y, z]: [f64; 3]| [x + 0.6 * x * (1.0 - x) * (y - 0.5), y, z];
     for family in FAMILIES {
         let stack = SecondOrderStack::new(blocks([2, 2, 1], [1, 2, 1]), family, 0.0, skew);
         for above in [true, false] {
-            match stack.patch(mortar(&stack, above)) {
-                Err(Error::ContactUnsettled { .. }) if matches!(family, Family::Lagrange) && above => {}
-                error => {
-                    let error = error.unwrap();
-                    assert!(error < 5e-3, "{family:?}, slave above: {above}: {error:e}");
-                }
-            }
+            let error = stack.patch(mortar(&stack, above)).unwrap();
+            assert!(error < 5e-3, "{family:?}, slave above: {above}: {error:e}");
         }
     }
 }

@@ -7,6 +7,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::OnSystem;
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
+use contact_dynamics_scenes::ironing;
 use contact_dynamics_scenes::random::xorshift;
 use contact_dynamics_scenes::schemes::all;
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -406,4 +407,21 @@ fn every_scheme_lets_blocks_fall() {
         let refused = Fall::new(&mut xorshift(4), 1, law).run((scheme.make)(), courant, scheme.takes_corrections());
         assert!(refused <= 12, "{}: {refused}", scheme.name());
     }
+}
+
+/// Two nodes meet, and each lies on facets of the other: the rows are the same, but not the accelerations along them,
+/// because both nodes slide along facets that turn. No force makes both gap accelerations vanish.
+#[test]
+fn a_stamp_is_drawn_over_nodes_that_meet_its_own() {
+    let scene = ironing::scene(60, 40);
+    let mut run = ironing::simulation(&scene, Box::new(scene.nodes_on_facets(2).unwrap())).unwrap();
+    run.run_until(172.0, &mut ()).unwrap();
+    // The stamp is far in, and slides without friction.
+    let mut force = [0.0; 2];
+    for contact in run.contact_forces() {
+        for (dof, part) in contact.forces().filter(|(dof, _)| *dof < 2 * scene.split) {
+            force[dof % 2] += part;
+        }
+    }
+    assert!(force[1] < 0.0 && force[0].abs() < 0.01 * -force[1], "{force:?}");
 }

@@ -8,7 +8,7 @@
 
 use crate::contact::ContactJacobian;
 use crate::real::Real;
-use crate::rounding::{ALTERNATING_FORCES, ALTERNATING_GAPS, ALTERNATION, SAME_ROWS, rounding};
+use crate::rounding::{ALTERNATING_FORCES, ALTERNATING_GAPS, ALTERNATION, LAST_FORCES, SAME_ROWS, rounding};
 use crate::simulation::rows::constraints::Constraints;
 
 /// Maximum number of linearizations of curved rows.
@@ -37,12 +37,15 @@ pub(crate) struct Worst {
     /// The relative difference, and the difference accepted once it no longer decreases.
     pub(crate) change: f64,
     pub(crate) tolerance: f64,
+    /// Whether the differences are small enough for a result if no more linearizations are left.
+    pub(crate) is_bearable: bool,
 }
 
 impl Worst {
     pub(crate) fn of(miss: Miss, (row, what): (usize, &'static str)) -> Self {
         let (what, change) = if miss.force > miss.gap { ("the force", miss.force) } else { (what, miss.gap) };
-        Self { row, what, change, tolerance: SAME_ROWS }
+        let is_bearable = miss.undone <= ALTERNATING_GAPS && miss.force <= LAST_FORCES;
+        Self { row, what, change, tolerance: SAME_ROWS, is_bearable }
     }
 }
 
@@ -55,23 +58,17 @@ impl Miss {
     }
 
     /// Whether the iteration may end after some `linearizations`: the miss is within rounding; or small and no longer
-    /// decreasing; or rows alternate; or it is small after the last one. `before` and `earlier` are the misses of the
-    /// last two linearizations.
+    /// decreasing; or rows alternate. `before` and `earlier` are the misses of the last two linearizations.
     pub(crate) fn has_converged<T: Real>(self, linearizations: usize, [before, earlier]: [Self; 2]) -> bool {
         let fit = rounding(T::one()).value();
         let within = |gap: f64, force: f64| self.gap <= gap.max(fit) && self.force <= force.max(fit);
         let now = self.largest();
-        let stalls = within(SAME_ROWS, SAME_ROWS) && now > 0.25 * before.largest();
-        let alternates = now >= ALTERNATION * earlier.largest();
-        let may_end = match linearizations {
-            // Where bodies are at rest gaps do not change; what contact undoes is left as a scale.
-            LINEARIZATIONS => {
-                let force = if alternates { ALTERNATING_FORCES } else { ALTERNATING_GAPS };
-                self.undone <= ALTERNATING_GAPS.max(fit) && self.force <= force.max(fit)
-            }
-            _ => linearizations > LONG && alternates && within(ALTERNATING_GAPS, ALTERNATING_FORCES),
-        };
-        now <= fit || stalls || may_end
+        let stalls =
+            within(SAME_ROWS, SAME_ROWS) && (now > 0.25 * before.largest() || linearizations == LINEARIZATIONS);
+        let alternates = linearizations > LONG
+            && within(ALTERNATING_GAPS, ALTERNATING_FORCES)
+            && now >= ALTERNATION * earlier.largest();
+        now <= fit || stalls || alternates
     }
 }
 
@@ -103,7 +100,7 @@ impl<T: Real> CurvedRowsWork<T> {
             apart: false,
             gaps: Vec::new(),
             predicted: Vec::new(),
-            worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: SAME_ROWS },
+            worst: Worst { row: 0, what: "the gap", change: 0.0, tolerance: SAME_ROWS, is_bearable: false },
             residual: 0.0,
             is_exact: true,
         }

@@ -21,6 +21,7 @@ pub mod impact_scenes;
 pub mod impacts;
 #[cfg(shared_instances)]
 mod instances;
+pub mod ironing;
 pub mod large;
 pub mod mindlin;
 pub mod obstacles;
