@@ -23,17 +23,17 @@ pub(crate) fn write(path: &Path, grid: &Grid, run: &Simulation<'_, f64>) -> Resu
     let cubes = (0..x).flat_map(|i| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k])));
     let connectivity = cubes
         .flat_map(|[i, j, k]| CORNERS.map(|[a, b, c]| grid.node([i + a, j + b, k + c])))
-        .flat_map(|node| (node as u32).to_le_bytes());
+        .flat_map(|node| (node as u64).to_le_bytes());
     let cubes = x * y * z;
-    let vector = |values: &[f64]| values.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
-    let places = grid.places().flatten().flat_map(|at| (grid.size as f32 * at as f32).to_le_bytes());
+    let vector = |values: &[f64]| values.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let places = grid.places().flatten().flat_map(|at| (grid.size * at as f64).to_le_bytes());
     let blocks: [Vec<u8>; 7] = [
         places.collect(),
         vector(run.state().displacement()),
         vector(run.state().velocity()),
         vector(&forces),
         connectivity.collect(),
-        (1..=cubes).flat_map(|cube| (8 * cube as u32).to_le_bytes()).collect(),
+        (1..=cubes).flat_map(|cube| (8 * cube as u64).to_le_bytes()).collect(),
         vec![HEXAHEDRON; cubes],
     ];
     // Each block follows its own length.
@@ -59,12 +59,12 @@ pub(crate) fn write(path: &Path, grid: &Grid, run: &Simulation<'_, f64>) -> Resu
          <Points>{}</Points>\n<PointData>{}{}{}</PointData>\n<Cells>{}{}{}</Cells>\n</Piece></UnstructuredGrid>\n\
          <AppendedData encoding=\"raw\">",
         grid.dofs() / 3,
-        array("Float32", "points", 3, 0),
-        array("Float32", "displacement", 3, 1),
-        array("Float32", "velocity", 3, 2),
-        array("Float32", "contact_force", 3, 3),
-        array("UInt32", "connectivity", 1, 4),
-        array("UInt32", "offsets", 1, 5),
+        array("Float64", "points", 3, 0),
+        array("Float64", "displacement", 3, 1),
+        array("Float64", "velocity", 3, 2),
+        array("Float64", "contact_force", 3, 3),
+        array("UInt64", "connectivity", 1, 4),
+        array("UInt64", "offsets", 1, 5),
         array("UInt8", "types", 1, 6),
     )?;
     write!(file, "_")?;

@@ -239,6 +239,33 @@ fn responses_that_cannot_be_kept_count_as_work() {
     assert!(statistics.contact_products > 0 && statistics.contact_iterations == 0, "{statistics:?}");
 }
 
+/// Rows that turn have W formed anew with every linearization, long steps or not: products with the coarse space are
+/// chosen beside a factor too.
+#[test]
+fn long_steps_choose_products() {
+    let solid = Solid::block([1.6, 1.6, 0.6], [16, 16, 6], MATERIAL);
+    let weight: Vec<f64> =
+        (0..).zip(solid.lumped_mass::<f64>()).map(|(dof, m)| if dof % 3 == 2 { -0.01 * m } else { 0.0 }).collect();
+    let system = solid.system::<f64>().load(move |_, f| f.copy_from_slice(&weight));
+    let hollow = Sphere::new([0.8, 0.8, 2000.0], 2000.0005, Side::Inside).unwrap();
+    let mut run = Simulation::builder(system, GeneralizedAlpha::default(), 9.0 * 0.1 / MATERIAL.wave_speed())
+        .constraint(on(&solid, hollow, ContactLaw::Rigid, 0.0))
+        .build()
+        .unwrap();
+    let mut pressed = 0;
+    for _ in 0..8 {
+        let before = *run.statistics();
+        run.step().unwrap();
+        let after = run.statistics();
+        if run.state().contacts().closed().iter().all(|&closed| closed) {
+            pressed += 1;
+            assert!(after.contact_products > before.contact_products + 10, "{before:?} {after:?}");
+            assert_eq!(after.contact_iterations, before.contact_iterations);
+        }
+    }
+    assert!(pressed > 0);
+}
+
 /// Two equations that contradict each other have no solution, and the error names what is left of them.
 #[test]
 fn what_cannot_be_closed_is_refused() {
