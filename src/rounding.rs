@@ -160,7 +160,7 @@ pub(crate) const ALTERNATING_FORCES: f64 = 0.1;
 /// and the difference is at least this share of the difference two linearizations before.
 pub(crate) const ALTERNATION: f64 = 0.999;
 
-/// After the last linearization of a stage forces may differ by this share, if gaps differ by at most
+/// At the last linearization of a stage rows may alternate by this share of the forces, if gaps differ by at most
 /// [`ALTERNATING_GAPS`] of the displacement that contact undoes.
 pub(crate) const LAST_FORCES: f64 = 1e-3;
 

@@ -88,8 +88,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         Ok(converged)
     }
 
-    /// Refuses contact whose curved rows have not converged. (Rows of bodies at rest may alternate: gaps then hardly
-    /// change, and a small difference is large beside this change.)
+    /// Refuses contact whose curved rows have not converged.
     pub(crate) fn refuse_not_converged(&self, converged: bool) -> Result<()> {
         let Worst { row, what, change, tolerance, is_bearable } = self.contact.rows.curved.worst;
         if converged || is_bearable {

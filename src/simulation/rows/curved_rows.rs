@@ -37,15 +37,14 @@ pub(crate) struct Worst {
     /// The relative difference, and the difference accepted once it no longer decreases.
     pub(crate) change: f64,
     pub(crate) tolerance: f64,
-    /// Whether the differences are small enough for a result if no more linearizations are left.
+    /// Whether the last linearization is [near enough](Miss::is_bearable) to a result.
     pub(crate) is_bearable: bool,
 }
 
 impl Worst {
     pub(crate) fn of(miss: Miss, (row, what): (usize, &'static str)) -> Self {
         let (what, change) = if miss.force > miss.gap { ("the force", miss.force) } else { (what, miss.gap) };
-        let is_bearable = miss.undone <= ALTERNATING_GAPS && miss.force <= LAST_FORCES;
-        Self { row, what, change, tolerance: SAME_ROWS, is_bearable }
+        Self { row, what, change, tolerance: SAME_ROWS, is_bearable: false }
     }
 }
 
@@ -69,6 +68,13 @@ impl Miss {
             && within(ALTERNATING_GAPS, ALTERNATING_FORCES)
             && now >= ALTERNATION * earlier.largest();
         now <= fit || stalls || alternates
+    }
+
+    /// Whether rows alternate at the last linearization by so little that this is a result: where bodies come to rest gaps
+    /// hardly change, and `undone` is the scale.
+    pub(crate) fn is_bearable(self, earlier: Self) -> bool {
+        let alternates = self.largest() >= ALTERNATION * earlier.largest();
+        alternates && self.undone <= ALTERNATING_GAPS && self.force <= LAST_FORCES
     }
 }
 

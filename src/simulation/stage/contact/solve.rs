@@ -25,7 +25,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let exact = projected_residual::<T>().value();
         // Problems by products with A are solved as well as their rows fit, and at last as far as rounding allows.
         let mut residual = if self.constraints.is_affine() { exact } else { FIRST_RESIDUAL };
-        let mut before = [Miss::ALL; 2];
+        let mut before = [Miss::ALL; 3];
         for iteration in 1..=LINEARIZATIONS {
             self.contact.rows.curved.begin(residual.max(exact));
             match iteration {
@@ -47,13 +47,15 @@ impl<T: Real> StageSolve<'_, '_, T> {
             }
             self.operator.follow(self.contact.rows.curved.version(self.constraints));
             let miss = self.measure_miss()?;
-            let fits = fits || miss.has_converged::<T>(iteration, before);
+            let fits = fits || miss.has_converged::<T>(iteration, [before[0], before[1]]);
             if fits && self.contact.rows.curved.is_exact {
                 return Ok(true);
             }
             residual = if fits { exact } else { residual.min(RESIDUAL_BY_MISS * miss.largest()) };
-            before = [miss, before[0]];
+            before = [miss, before[0], before[1]];
         }
+        let [last, _, earlier] = before;
+        self.contact.rows.curved.worst.is_bearable = last.is_bearable(earlier);
         Ok(false)
     }
 
