@@ -1,14 +1,17 @@
 //! A simulation, its steps and its state.
 
 use crate::arrays::{ANY, floats, indices};
-use crate::callback::detached;
+use crate::callback::{detached, infallible};
 use crate::error::{Result, refused};
 use crate::record::{Recorder, Watch};
 use crate::{contact, named, system};
+use contact_dynamics::contact::ContactId;
+use contact_dynamics::gradient::{RecordedStep, Scales, Seed};
 use contact_dynamics::{InitialOverclosure, Outcome, Simulation, StepControl};
-use numpy::{IntoPyArray, PyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -38,6 +41,7 @@ struct Options<'py> {
     check_stability: bool,
     energy: String,
     dofs: Bound<'py, PyAny>,
+    differentiable: bool,
     resume: Option<Vec<u8>>,
 }
 
@@ -98,7 +102,10 @@ impl Run {
                 postcard::from_bytes(&bytes).map_err(|error| refused(format!("this is no checkpoint: {error}")))?;
             builder = builder.resume_from(read);
         }
-        let run = detached(py, || builder.build())?;
+        let mut run = detached(py, || builder.build())?;
+        if options.differentiable {
+            run.record_checkpoints()?;
+        }
         Ok(Self { run: Mutex::new(run), recorder: Recorder::new(recorded, options.energy != "none") })
     }
 
@@ -159,6 +166,44 @@ impl Run {
             (id.constraint, id.feature, id.candidate, status, gap, force, friction, slip, position, normal)
         };
         self.run().contact_forces().map(contact).collect()
+    }
+
+    /// The value of an objective, and its derivatives by name. `term` gets time, step size, number, last number; the
+    /// vectors of a state; and vectors of zeros, to which it adds the derivatives of the value that it returns.
+    fn gradient<'py>(&mut self, py: Python<'py>, term: Py<PyAny>) -> Result<Bound<'py, PyDict>> {
+        let mut objective = |step: &RecordedStep<'_, f64>, seed: &mut Seed<'_, f64>| {
+            infallible(f64::NAN, |py| {
+                let (state, contacts) = (step.state, step.state.contacts());
+                let fields = [state.displacement(), state.velocity(), state.acceleration()];
+                let values = fields.into_iter().chain([contacts.forces(), contacts.impulses()]);
+                let values: Vec<_> = values.map(|values| PyArray1::from_slice(py, values)).collect();
+                let Seed { displacement, velocity, acceleration, force, impulse, .. } = seed;
+                let own: [&mut [f64]; 5] = [displacement, velocity, acceleration, force, impulse];
+                let added: Vec<_> = own.iter().map(|own| PyArray1::<f64>::zeros(py, own.len(), false)).collect();
+                let numbers = (state.time(), step.h, step.step, step.steps);
+                let value = term.bind(py).call1((numbers, values, &added))?.extract()?;
+                for (own, added) in own.into_iter().zip(added) {
+                    own.iter_mut().zip(added.readonly().as_array()).for_each(|(own, added)| *own += added);
+                }
+                Ok(value)
+            })
+        };
+        let (mut scales, run) = (Scales::default(), self.run());
+        let found = detached(py, || run.gradient(&mut objective, &mut scales))?;
+        let by_contact = |values: Vec<(ContactId, f64)>| -> BTreeMap<_, _> {
+            values.into_iter().map(|(id, value)| ((id.constraint, id.feature, id.candidate), value)).collect()
+        };
+        let columns = PyDict::new(py);
+        columns.set_item("displacement", found.displacement.into_pyarray(py))?;
+        columns.set_item("velocity", found.velocity.into_pyarray(py))?;
+        columns.set_item("gaps", by_contact(found.gaps))?;
+        columns.set_item("friction", by_contact(found.friction))?;
+        let Scales { mass, damping, stiffness, load, contact, .. } = scales;
+        let names = ["value", "mass", "damping", "stiffness", "load", "contact"];
+        for (name, value) in names.into_iter().zip([found.value, mass, damping, stiffness, load, contact]) {
+            columns.set_item(name, value)?;
+        }
+        Ok(columns)
     }
 
     fn __repr__(&mut self) -> String {

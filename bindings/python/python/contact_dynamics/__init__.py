@@ -17,10 +17,11 @@ refuses raises ContactDynamicsError.
 
 from ._core import ContactDynamicsError, Inadmissible, outer_facets, preset_mass
 from .contacts import BodyContact, Cuboid, LinearRows, NodesOnObstacle, Plane, SignedDistance, Sphere
+from .gradient import Gradient
 from .result import Result, plot
 from .simulation import Contact, Simulation
 from .systems import LinearSystem, NonlinearSystem
 
-__all__ = ["BodyContact", "Contact", "ContactDynamicsError", "Cuboid", "Inadmissible", "LinearRows", "LinearSystem"]
-__all__ += ["NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere"]
+__all__ = ["BodyContact", "Contact", "ContactDynamicsError", "Cuboid", "Gradient", "Inadmissible", "LinearRows"]
+__all__ += ["LinearSystem", "NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere"]
 __all__ += ["outer_facets", "plot", "preset_mass"]

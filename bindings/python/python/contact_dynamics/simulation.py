@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ._core import Run
 from .contacts import BodyContact, LinearRows, Named, NodesOnObstacle
+from .gradient import Fields, Gradient, Objective, Step
 from .result import Result
 from .systems import LinearSystem, NonlinearSystem, Vector
 
@@ -68,6 +69,7 @@ class Simulation:
     check_stability: refuse a step beyond the stability limit of an explicit scheme.
     energy: what run records: "none", "state" (kinetic and potential) or "balance" (with all works).
     dofs: dofs whose motion run records.
+    differentiable: keep what gradient needs, some √N states of N steps.
     resume: a checkpoint of an equally built simulation, from which this one starts.
     """
 
@@ -90,6 +92,7 @@ class Simulation:
         check_stability: bool = True,
         energy: str = "state",
         dofs: ArrayLike = (),
+        differentiable: bool = False,
         resume: bytes | None = None,
     ) -> None:
         names = ("self", "system", "contacts")
@@ -172,6 +175,14 @@ class Simulation:
     def reactions(self) -> Vector:
         """Forces of the supports on the fixed and driven dofs, in ascending order of these."""
         return self._run.vector("reactions")
+
+    def gradient(self, objective: Objective) -> Gradient:
+        """Derivatives of a number of the run so far, of a simulation that is built as differentiable.
+
+        The number is the sum of objective(step, state, seed) over the states, see Objective. It takes the time of two
+        more runs. Contacts that close in other steps under other parameters are kinks (docs/gradients.md).
+        """
+        return Gradient(**self._run.gradient(lambda at, state, seed: objective(Step(*at), Fields(*state), Fields(*seed))))
 
     def checkpoint(self) -> bytes:
         """State and history, to be pickled or written to a file; an equally built simulation goes on bit for bit."""
