@@ -243,7 +243,7 @@ fn responses_that_cannot_be_kept_count_as_work() {
 /// chosen beside a factor too.
 #[test]
 fn long_steps_choose_products() {
-    let solid = Solid::block([1.6, 1.6, 0.6], [16, 16, 6], MATERIAL);
+    let solid = Solid::block([1.6, 1.6, 0.3], [16, 16, 3], MATERIAL);
     let weight: Vec<f64> =
         (0..).zip(solid.lumped_mass::<f64>()).map(|(dof, m)| if dof % 3 == 2 { -0.01 * m } else { 0.0 }).collect();
     let system = solid.system::<f64>().load(move |_, f| f.copy_from_slice(&weight));
