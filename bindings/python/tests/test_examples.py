@@ -32,7 +32,7 @@ def test_programs_of_the_page_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     programs = (EXAMPLES.parents[2] / "docs/python.md").read_text().split("```python\n")[1:]
     exec("".join(program.split("```")[0] for program in programs), {})
-    assert len(programs) == 2 and (tmp_path / "force.png").exists()
+    assert len(programs) == 3 and (tmp_path / "force.png").exists()
 
 
 def test_notebook_runs_and_asserts():

@@ -23,5 +23,5 @@ from .simulation import Contact, Simulation
 from .systems import LinearSystem, NonlinearSystem
 
 __all__ = ["BodyContact", "Contact", "ContactDynamicsError", "Cuboid", "Gradient", "Inadmissible", "LinearRows"]
-__all__ += ["LinearSystem", "NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation", "Sphere"]
-__all__ += ["outer_facets", "plot", "preset_mass"]
+__all__ += ["LinearSystem", "NodesOnObstacle", "NonlinearSystem", "Plane", "Result", "SignedDistance", "Simulation"]
+__all__ += ["Sphere", "outer_facets", "plot", "preset_mass"]

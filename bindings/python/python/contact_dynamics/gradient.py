@@ -32,16 +32,16 @@ class Step(NamedTuple):
 
 
 Objective = Callable[[Step, Fields, Fields], float]
-"""objective(step, state, seed): a term of the sum over all states that is differentiated. It adds the derivatives of the
-term by the fields of the state to those of seed, as in seed.force[0] += 1.0."""
+"""objective(step, state, seed): a term of the sum over all states that is differentiated. It adds the derivatives of
+the term by the fields of the state to those of seed, as in seed.force[0] += 1.0."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
     """Derivatives of the value, a sum of terms.
 
-    displacement, velocity: by initial values, (n). gaps: by a constant added to the gap of each contact that has carried
-        a force. friction: by the coefficient of each contact that has slid.
+    displacement, velocity: by initial values, (n). gaps: by a constant added to the gap of each contact that has
+        carried a force. friction: by the coefficient of each contact that has slid.
     mass, damping, stiffness, load, contact: by factors of M, C, K, the load, and the forces of compliant laws.
     """
 

@@ -182,7 +182,8 @@ class Simulation:
         The number is the sum of objective(step, state, seed) over the states, see Objective. It takes the time of two
         more runs. Contacts that close in other steps under other parameters are kinks (docs/gradients.md).
         """
-        return Gradient(**self._run.gradient(lambda at, state, seed: objective(Step(*at), Fields(*state), Fields(*seed))))
+        columns = self._run.gradient(lambda at, *fields: objective(Step(*at), *(Fields(*own) for own in fields)))
+        return Gradient(**columns)
 
     def checkpoint(self) -> bytes:
         """State and history, to be pickled or written to a file; an equally built simulation goes on bit for bit."""
