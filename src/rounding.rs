@@ -81,8 +81,8 @@ pub(crate) fn projected_residual<T: Float>() -> T {
     number::<T>(1e-12).max(number::<T>(8.0) * T::epsilon())
 }
 
-/// The residual of the first contact problem of a stage with turning rows, relative to the contact forces; and of a later
-/// one, divided by the largest change of its rows since the last problem.
+/// The residual of the first contact problem of a stage with turning rows, relative to the contact forces; and of a
+/// later one, divided by the largest change of its rows since the last problem.
 pub(crate) const FIRST_RESIDUAL: f64 = 1e-4;
 pub(crate) const RESIDUAL_BY_MISS: f64 = 1e-3;
 
@@ -105,8 +105,8 @@ pub(crate) fn touching<T: Float>(way: T) -> T {
 
 // Gradients.
 
-/// The largest difference between derivatives of rows by differences over two distances: relative to the derivative, and
-/// to the derivative of a row that turns by 1 over the length of its facet. Across a jump of the row it is larger.
+/// The largest difference between derivatives of rows by differences over two distances: relative to the derivative,
+/// and to the derivative of a row that turns by 1 over the length of its facet. Across a jump of the row it is larger.
 pub(crate) const DIFFERENCES: f64 = 1e-4;
 
 // Geometry of surfaces.

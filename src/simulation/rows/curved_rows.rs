@@ -70,8 +70,8 @@ impl Miss {
         now <= fit || stalls || alternates
     }
 
-    /// Whether rows alternate at the last linearization by so little that this is a result: where bodies come to rest gaps
-    /// hardly change, and `undone` is the scale.
+    /// Whether rows alternate at the last linearization by so little that this is a result: where bodies come to rest
+    /// gaps hardly change, and `undone` is the scale.
     pub(crate) fn is_bearable(self, earlier: Self) -> bool {
         let alternates = self.largest() >= ALTERNATION * earlier.largest();
         alternates && self.undone <= ALTERNATING_GAPS && self.force <= LAST_FORCES
