@@ -25,6 +25,7 @@ def show(source, array, axis, preset, span, camera):
     view.Background = [1.0, 1.0, 1.0]
     shape = WarpByVector(Input=source, Vectors=["POINTS", "displacement"], ScaleFactor=MAGNIFIED)
     display = Show(shape, view)
+    display.Ambient, display.Diffuse = 0.45, 0.6
     ColorBy(display, ("POINTS", array, axis))
     colors = GetColorTransferFunction(array)
     colors.ApplyPreset(preset, True)
@@ -44,7 +45,7 @@ cut = Clip(Input=slab, ClipType="Plane", Invert=0)
 # (Crests are a quarter of a wave from the sides; there are three waves a side.)
 cut.ClipType.Origin = [middle[0], low[1] + (high[1] - low[1]) / 12.0, middle[2]]
 cut.ClipType.Normal = [0.0, 1.0, 0.0]
-below = show(slab, "contact_force", "Z", "Viridis (matplotlib)", [0.0, force], [0.7, -1.3, -1.1])
+below = show(slab, "contact_force", "Z", "Viridis (matplotlib)", [0.0, force], [0.9, -1.6, -1.35])
 inside = show(cut, "velocity", "Z", "Cool to Warm", [-speed, speed], [0.6, -1.7, 0.9])
 AssignViewToLayout(view=below, layout=layout, hint=0)
 layout.SplitHorizontal(layout.GetViewLocation(below), 0.5)
