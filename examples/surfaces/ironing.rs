@@ -1,7 +1,7 @@
 //! Ironing: a round stamp is pressed into a block and drawn along it, slowly. The forces of a continuum are constant.
 
 use contact_dynamics::contact::ContactConstraint;
-use contact_dynamics_scenes::ironing::{END, LENGTH, SETTLED, WAY, scene, simulation};
+use contact_dynamics_scenes::ironing::{END, LENGTH, SETTLED, WAY, force_on_block, scene, simulation};
 use contact_dynamics_scenes::stacks::Stack;
 use std::error::Error;
 use std::fmt::Write;
@@ -53,12 +53,7 @@ fn run(scene: &Stack<2>, contact: Box<dyn ContactConstraint<f64>>) -> Result<[f6
         if run.time() < SETTLED + 0.2 * (END - SETTLED) || run.time() > END - 0.2 * (END - SETTLED) {
             continue;
         }
-        let mut force = [0.0; 2];
-        for contact in run.contact_forces() {
-            for &(dof, weight) in contact.row.iter().filter(|(dof, _)| *dof < 2 * scene.split) {
-                force[dof % 2] += weight * contact.force;
-            }
-        }
+        let force = force_on_block(scene, &run);
         (smallest, largest) = (smallest.min(-force[1]), largest.max(-force[1]));
         (sum, across, count) = (sum - force[1], across.max(force[0].abs()), count + 1.0);
     }

@@ -417,11 +417,6 @@ fn a_stamp_is_drawn_over_nodes_that_meet_its_own() {
     let mut run = ironing::simulation(&scene, Box::new(scene.nodes_on_facets(2).unwrap())).unwrap();
     run.run_until(172.0, &mut ()).unwrap();
     // The stamp is far in, and slides without friction.
-    let mut force = [0.0; 2];
-    for contact in run.contact_forces() {
-        for (dof, part) in contact.forces().filter(|(dof, _)| *dof < 2 * scene.split) {
-            force[dof % 2] += part;
-        }
-    }
+    let force = ironing::force_on_block(&scene, &run);
     assert!(force[1] < 0.0 && force[0].abs() < 0.01 * -force[1], "{force:?}");
 }

@@ -54,3 +54,14 @@ pub fn simulation(scene: &Stack<2>, contact: Box<dyn ContactConstraint<f64>>) ->
     }
     Simulation::builder(system, Newmark::new(0.5, 1.0)?, 0.25).constraint(contact).build()
 }
+
+/// The force of the stamp on the block.
+pub fn force_on_block(scene: &Stack<2>, run: &Simulation<'_, f64>) -> [f64; 2] {
+    let mut force = [0.0; 2];
+    for contact in run.contact_forces() {
+        for (dof, part) in contact.forces().filter(|(dof, _)| *dof < 2 * scene.split) {
+            force[dof % 2] += part;
+        }
+    }
+    force
+}
