@@ -164,9 +164,6 @@ pub(crate) const ALTERNATION: f64 = 0.999;
 /// [`ALTERNATING_GAPS`] of the displacement that contact undoes.
 pub(crate) const LAST_FORCES: f64 = 1e-3;
 
-/// Displacements of dofs without mass have converged if the largest increment is this share of the first one.
-pub(crate) const STATIC_INCREMENT: f64 = 1e-9;
-
 /// An increment of Newton's method, over ε times the displacements, up to which a residual that has no scale may end
 /// the iteration by stagnating.
 pub(crate) const SMALL_INCREMENT: f64 = 1e4;

@@ -37,6 +37,11 @@ pub(crate) trait Body<T> {
     /// can get there.
     fn multiply(&mut self, reach: usize, x: &[T], y: &mut [T]) -> Result<()>;
 
+    /// The number of a dof of the system in these vectors; none if it does not move.
+    fn number(&self, dof: usize) -> Option<usize> {
+        Some(dof)
+    }
+
     /// The sum over all dofs, of which there are `dofs` on this rank, from the sums over ranges of them.
     fn sum(&self, dofs: usize, part: &dyn Fn(Range<usize>) -> T) -> Result<T> {
         Ok(part(0..dofs))

@@ -4,10 +4,12 @@
 //! - `contact_path`, `interface`: the order of elimination, and the dofs that contact acts on.
 //! - `responses`, `delassus`: responses of the interface to unit forces, and the Delassus operator of the rows.
 //! - `products`: contact problems solved without it.
+//! - `part`: a part of the dofs with a matrix of its own.
 
 pub(super) mod contact_path;
 pub(super) mod interface;
 pub(super) mod matrix;
+pub(super) mod part;
 pub(super) mod responses;
 pub(super) mod tangent;
 
@@ -18,17 +20,21 @@ use crate::contact::{ContactJacobian, Groups, RowProducts};
 use crate::contact_solver::{Assembly, FORESEEN, Outcome, RowData};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
+use crate::mass::Mass;
 use crate::memory;
 use crate::ranks::Together;
 use crate::real::Real;
 use crate::rounding::largest_compliance;
 use crate::simulation::operator::contact_path::{ContactPath, analyze, condensation, respond};
+use crate::simulation::operator::interface::keep;
 use crate::simulation::operator::matrix::EffectiveMatrix;
 use crate::simulation::operator::responses::{Responses, Unit};
 use crate::simulation::operator::tangent::At;
 use crate::system::System;
 use delassus::Delassus;
+use part::{Embedded, Part};
 use products::Products;
+use std::sync::Arc;
 
 /// A factorized effective matrix and the responses to contact computed with it so far.
 ///
@@ -38,6 +44,8 @@ use products::Products;
 #[derive(Debug)]
 pub(crate) struct Operator<T> {
     matrix: EffectiveMatrix<T>,
+    /// In the place of `matrix` for a part of the dofs.
+    part: Option<Arc<Part<T>>>,
     factor: Box<dyn Factorization<T>>,
     interface: Vec<usize>,
     responses: Responses<T>,
@@ -90,6 +98,7 @@ impl<T: Real> Operator<T> {
         }
         let mut operator = Self {
             matrix,
+            part: None,
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
@@ -120,10 +129,11 @@ impl<T: Real> Operator<T> {
 
     /// A factor of a part of the system that does not depend on the step size: it is used for contact and solves, and
     /// not factorized again. Responses are kept for each `unit`.
-    pub(crate) fn of_part(factor: Box<dyn Factorization<T>>, interface: &[usize], unit: Unit) -> Result<Self> {
+    pub(crate) fn of_part(factor: Embedded<T>, interface: &[usize], unit: Unit) -> Result<Self> {
         Ok(Self {
             matrix: EffectiveMatrix::none()?,
-            factor,
+            part: Some(factor.part.clone()),
+            factor: Box::new(factor),
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
             diagonal: DiagonalResponses { reciprocals: Vec::new(), products: RowProducts::default() },
@@ -358,8 +368,11 @@ impl<T: Real> Operator<T> {
         answer: [&mut [T]; 2],
     ) -> Result<Option<Outcome>> {
         let RowData { g, rows, .. } = data;
-        let responds = |&row: &usize| g.located(row).next().is_some();
-        if data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
+        let moves = |place| self.part.as_ref().is_none_or(|part| part.has_place(place));
+        let responds = |&row: &usize| g.located(row).any(|(place, _)| moves(place));
+        // Ranks number their parts by themselves.
+        let spans = self.part.is_some() && !together.is_alone();
+        if spans || data.compliance.iter().any(|c| !c.is_finite()) || !rows.iter().all(responds) {
             return Ok(None);
         }
         let (responses, iterates) = (self.work_of_responses(rows.len()), self.iterates());
@@ -374,16 +387,21 @@ impl<T: Real> Operator<T> {
                 None => return Ok(None),
             }
         }
-        products
-            .solve(
-                (&self.matrix, &self.interface),
-                (system, together),
-                data,
-                multipliers,
-                (affordable, residual),
-                answer,
-            )
-            .map(Some)
+        let [forces, response] = answer;
+        let a = (!products.is_packed).then(|| match &self.part {
+            Some(part) => part.matrix.as_ref(),
+            None => self.matrix.view(system),
+        });
+        let dofs = self.part.as_ref().map(|part| &part.dofs[..]);
+        let outcome = products.solve((a, dofs), together, data, multipliers, (affordable, residual), forces)?;
+        if outcome.is_solved {
+            let d = products.solution();
+            match &self.part {
+                Some(part) => part.write_on_interface(d, response),
+                None => keep(&self.interface, d, response),
+            }
+        }
+        Ok(Some(outcome))
     }
 
     /// Multiplications for the responses to some rows, if the matrix changes too often to keep them.
@@ -405,17 +423,32 @@ impl<T: Real> Operator<T> {
         if self.products.as_ref().is_some_and(|products| products.is_current) {
             return Ok(());
         }
-        together.agree(if self.varies() { Ok(()) } else { self.matrix.assemble(system, h, at) })?;
-        let matrix = &self.matrix;
+        let whole = self.part.is_none();
+        together.agree(if !whole || self.varies() { Ok(()) } else { self.matrix.assemble(system, h, at) })?;
+        // A smooth motion of a whole system has inertia alone, one of a part the stiffness towards the others.
+        let (a, touched, fixed, smooth) = match &self.part {
+            Some(part) => (part.matrix.as_ref(), &part.touched, &[][..], part.sum_of_entries()),
+            None => (self.matrix.view(system), &self.interface, system.prescribed(), self.inertia(system, together, h)),
+        };
         let products = match &mut self.products {
             Some(products) => products,
-            none => none.insert(Box::new(together.agree(Products::new(matrix, system, &self.interface))?)),
+            none => none.insert(Box::new(together.agree(Products::new(a.symbolic(), touched))?)),
         };
-        products.read((matrix, &self.interface), (system, together), h)?;
+        products.read(a, (touched, fixed), smooth, together)?;
         if products.is_packed && !self.varies() {
             self.matrix.free_values();
         }
         Ok(())
+    }
+
+    /// The inertia of smooth motions on the free dofs that this rank owns.
+    fn inertia(&self, system: &dyn System<T>, together: &Together<T>, h: f64) -> f64 {
+        let free = |dof: &usize| system.prescribed().binary_search(dof).is_err();
+        let mass = |dof: usize| match system.mass() {
+            Mass::Lumped(mass) => mass[dof].value(),
+            Mass::Consistent(mass) => mass.val_of_col(dof).iter().map(|m| m.value()).sum(),
+        };
+        self.matrix.inertia(h) * together.owned(system.dofs()).flatten().filter(free).map(mass).sum::<f64>()
     }
 
     /// Another stage begins: contact problems solved so far are not near those to come.

@@ -3,9 +3,11 @@
 
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, NodesOnObstacle, Obstacle, Plane, Side, Sphere};
 use contact_dynamics::contact_solver::Assembly;
+use contact_dynamics::corrector::WorkBalance;
+use contact_dynamics::mass::{self, Redistribution};
 use contact_dynamics::{
-    ActiveSet, Automatic, Composite, ConjugateGradients, ContactStatus, Error, GeneralizedAlpha, LinearRows,
-    LinearSolver, LinearSystem, PersistencyCorrection, Real, Simulation, System, TimeIntegrator,
+    ActiveSet, Automatic, CdLagrange, Composite, ConjugateGradients, ContactStatus, Error, GeneralizedAlpha,
+    LinearRows, LinearSolver, LinearSystem, PersistencyCorrection, Real, Simulation, System, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -135,6 +137,70 @@ fn blocks_of_other_meshes_stick_and_slide() {
     }
     let contact = || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.nodes_on_facets(1).unwrap()) };
     compare("nodes on facets", (SIZE, 12), &velocity, || stack.solid.system(), contact);
+}
+
+/// Runs a scene whose `light` nodes have no mass by an explicit scheme, with W and without it, and compares all states.
+/// Returns how many contacts closed at most, and slid.
+fn compare_massless(
+    what: &str,
+    (solid, light): (&Solid<3>, &[usize]),
+    velocity: &[f64],
+    contact: impl Fn() -> Box<dyn ContactConstraint<f64>>,
+) -> [usize; 2] {
+    let massless: Vec<usize> = light.iter().flat_map(|&node| solid.node_dofs()[node]).collect();
+    let groups: Vec<usize> = (0..solid.dofs()).map(|dof| dof % 3).collect();
+    let mass = mass::redistribute(&solid.lumped_mass(), &massless, &groups, Redistribution::Uniform).unwrap();
+    let [mut with_w, mut without] = [Assembly::Always, Assembly::Never].map(|assembly| {
+        let system = LinearSystem::lumped(mass.clone(), solid.stiffness()).unwrap();
+        Simulation::builder(system, CdLagrange, 0.3 * SIZE / MATERIAL.wave_speed())
+            .velocity(velocity.to_vec())
+            .constraint(contact())
+            .contact_solver(ActiveSet::default().with_assembly(assembly))
+            .corrector(WorkBalance)
+            .build()
+            .unwrap()
+    });
+    let mut most = [0; 2];
+    for step in 0..40 {
+        with_w.step().unwrap();
+        without.step().unwrap();
+        let (one, other) = (with_w.state(), without.state());
+        let name = format!("{what}, step {step}");
+        near(&name, one.displacement(), other.displacement(), 1e-8);
+        near(&name, one.contacts().forces(), other.contacts().forces(), 1e-6);
+        let closed = one.contacts().closed();
+        let sliding = |&contact: &usize| one.contacts().status(contact) == ContactStatus::Sliding;
+        most[0] = most[0].max(closed.iter().filter(|closed| **closed).count());
+        most[1] = most[1].max((0..closed.len()).filter(sliding).count());
+    }
+    let [one, other] = [&with_w, &without].map(|run| *run.statistics());
+    assert!(one.contact_products == 0 && one.contact_iterations > 0, "{what}: {one:?}");
+    assert!(other.contact_products > 0 && other.contact_iterations == 0, "{what}: {other:?}");
+    most
+}
+
+#[test]
+fn dofs_without_mass_in_explicit_steps() {
+    let solid = block();
+    let bottom: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] == 0.0).collect();
+    // Contact acts on all dofs without mass, or on half of them.
+    let layers: Vec<usize> = (0..solid.nodes.len()).filter(|&node| solid.nodes[node][2] < 0.3).collect();
+    let sphere = || Sphere::new([0.5, 0.5, -4.0], 3.98, Side::Outside).unwrap();
+    for (light, friction, slides) in [(&bottom, 0.0, false), (&bottom, 0.2, true), (&layers, 0.0, false)] {
+        let contact = || on(&solid, sphere(), ContactLaw::Rigid, friction);
+        let what = format!("sphere, {} nodes, {friction}", light.len());
+        let [closed, slid] = compare_massless(&what, (&solid, light), &solid.uniform([0.1, 0.04, -0.1]), contact);
+        assert!(closed > 8 && (!slides || slid > 3), "{what}: {closed} {slid}");
+    }
+    // The other side of the contact has a mass.
+    let bodies = [4, 5].map(|n| Solid::block([1.0; 3], [n, n, 2], MATERIAL));
+    let stack = Stack::new(bodies, 0.002, |x| x);
+    let side: Vec<usize> =
+        (stack.split..stack.solid.nodes.len()).filter(|&node| stack.solid.nodes[node][2] < 1.1).collect();
+    let contact = || -> Box<dyn ContactConstraint<f64>> { Box::new(stack.mortar(true).unwrap()) };
+    let velocity = stack.velocity_of_upper([0.05, 0.02, -0.1]);
+    let [closed, _] = compare_massless("mortar", (&stack.solid, &side), &velocity, contact);
+    assert!(closed > 8, "{closed}");
 }
 
 #[test]

@@ -56,6 +56,8 @@ impl<T: Real> Rows<T> {
         let turned = self.blocks.iter().any(|block| block.axis != [T::one(), T::zero()]);
         let Self { g, before, offset, tolerance, compliance, blocks, names } = self;
         let RowData { g: all, rows, .. } = problem.data;
+        let entries_of =
+            |row: usize| all.row(row).filter_map(|(dof, weight)| Some((problem.body.number(dof)?, weight)));
         memory::copy(offset, problem.data.offset, WHAT)?;
         memory::copy(tolerance, problem.data.tolerance, WHAT)?;
         memory::copy(compliance, problem.data.compliance, WHAT)?;
@@ -68,9 +70,9 @@ impl<T: Real> Rows<T> {
         for &set in problem.data.sets {
             for row in first..first + set.rows() {
                 let other = if set.rows() == 3 && row > first { 2 * first + 3 - row } else { row };
-                let dofs = |row: usize| all.row(rows[row]).map(|(dof, _)| dof);
-                let own = all.row(rows[row]);
-                if dofs(row).eq(dofs(other)) {
+                let dofs = |row: usize| entries_of(rows[row]).map(|(dof, _)| dof);
+                let own = entries_of(rows[row]);
+                if row == other || dofs(row).eq(dofs(other)) {
                     g.push_entries(own);
                     continue;
                 }

@@ -3,15 +3,12 @@
 use crate::contact_solver::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 use crate::error::Result;
 use crate::linear_solver::coarse_space::{Aggregates, CoarseSpace, WORTHWHILE, node_size};
-use crate::mass::Mass;
 use crate::memory;
 use crate::ranks::Together;
 use crate::real::Real;
 use crate::rounding::projected_residual;
-use crate::simulation::operator::matrix::EffectiveMatrix;
 use crate::sparse::Product;
-use crate::system::System;
-use faer::sparse::SparseColMatRef;
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::ops::Range;
 
 /// What products need of an effective matrix.
@@ -57,9 +54,9 @@ fn digits(residual: f64) -> f64 {
 
 impl<T: Real> Products<T> {
     /// For contact that acts on some dofs.
-    pub(super) fn new(matrix: &EffectiveMatrix<T>, system: &dyn System<T>, interface: &[usize]) -> Result<Self> {
-        let mut product = Product::of_symmetric(matrix.view(system).symbolic())?;
-        product.measure(interface)?;
+    pub(super) fn new(pattern: SymbolicSparseColMatRef<'_, usize>, touched: &[usize]) -> Result<Self> {
+        let mut product = Product::of_symmetric(pattern)?;
+        product.measure(touched)?;
         Ok(Self {
             product,
             is_packed: false,
@@ -76,21 +73,22 @@ impl<T: Real> Products<T> {
         })
     }
 
-    /// Reads a matrix.
+    /// Reads a matrix. Contact may act on the `touched` dofs; in the columns of `fixed` dofs the diagonal is the only
+    /// entry. `smooth` is the share of this rank in 1ᵀA 1, the stiffness of smooth motions.
     pub(super) fn read(
         &mut self,
-        (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
-        (system, together): (&dyn System<T>, &Together<T>),
-        h: f64,
+        a: SparseColMatRef<'_, usize, T>,
+        (touched, fixed): (&[usize], &[usize]),
+        smooth: f64,
+        together: &Together<T>,
     ) -> Result<()> {
-        let own = self.read_own(matrix, (system, together));
-        let [whole, mass] = together.sum(own)?;
+        let own = self.read_diagonal(a, fixed, together).map(|own| [own, smooth]);
+        let [whole, smooth] = together.sum(own)?;
         // Other ranks know the diagonal at dofs whose elements are all theirs.
         together.share(&mut self.inverse)?;
-        // A smooth motion has the mass of the diagonal without its stiffness; the stiffest motion has twice both.
-        let condition = (2.0 * whole / (matrix.inertia(h) * mass)).max(1.0);
-        self.deflates =
-            together.is_alone() && condition > WORTHWHILE && self.form_coarse_space(matrix.view(system), interface)?;
+        // The stiffest motion has twice the diagonal.
+        let condition = (2.0 * whole / smooth).max(1.0);
+        self.deflates = together.is_alone() && condition > WORTHWHILE && self.form_coarse_space(a, touched)?;
         // With a coarse space twice the Courant number takes some 1.3 times as many products.
         let condition = if self.deflates { WORTHWHILE * (condition / WORTHWHILE).cbrt() } else { condition };
         let wanted = 0.5 * condition.sqrt() * digits(projected_residual::<T>().value());
@@ -103,7 +101,6 @@ impl<T: Real> Products<T> {
             _ => 1.0,
         };
         let of_space = self.space.as_ref().filter(|_| self.deflates).map_or(0, CoarseSpace::stored_values);
-        let a = matrix.view(system);
         let sizes = [share * a.val().len().midpoint(a.ncols()) as f64 + of_space as f64, a.ncols() as f64];
         [self.entries, self.dofs] = together.max(Ok(sizes))?;
         self.is_current = true;
@@ -141,29 +138,22 @@ impl<T: Real> Products<T> {
         })
     }
 
-    /// Reads what this rank has. Returns the sums of the diagonals of A and of M over the free dofs that it owns.
-    fn read_own(
+    /// Reads what this rank has. Returns the sum of the diagonal of A over the free dofs that it owns.
+    fn read_diagonal(
         &mut self,
-        matrix: &EffectiveMatrix<T>,
-        (system, together): (&dyn System<T>, &Together<T>),
-    ) -> Result<[f64; 2]> {
-        let a = matrix.view(system);
+        a: SparseColMatRef<'_, usize, T>,
+        fixed: &[usize],
+        together: &Together<T>,
+    ) -> Result<f64> {
         self.is_packed = self.product.pack(a)?;
         self.inverse.clear();
         memory::make_room(&mut self.inverse, a.ncols(), "the diagonal of the effective matrix")?;
-        let free = |dof: &usize| system.prescribed().binary_search(dof).is_err();
+        let free = |dof: &usize| fixed.binary_search(dof).is_err();
         let diagonal = |dof: usize| Some(a.val_of_col(dof)[a.row_idx_of_col_raw(dof).binary_search(&dof).ok()?]);
         let own = |dof: usize| diagonal(dof).filter(|own| free(&dof) && *own != T::zero());
         self.inverse.extend((0..a.ncols()).map(|dof| own(dof).map_or(T::zero(), T::recip)));
-        let (mut whole, mut mass) = (0.0, 0.0);
-        for dof in together.owned(a.ncols()).flatten().filter(free) {
-            whole += diagonal(dof).map_or(0.0, T::value);
-            mass += match system.mass() {
-                Mass::Lumped(mass) => mass[dof].value(),
-                Mass::Consistent(mass) => mass.val_of_col(dof).iter().map(|m| m.value()).sum(),
-            };
-        }
-        Ok([whole, mass])
+        let owned = together.owned(a.ncols()).flatten().filter(free);
+        Ok(owned.map(|dof| diagonal(dof).map_or(0.0, T::value)).sum())
     }
 
     /// Products to be tried for a problem to a residual, of rows with so many entries, if the work with W (in
@@ -192,27 +182,20 @@ impl<T: Real> Products<T> {
         self.answered.clear();
     }
 
-    /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves the
-    /// forces Gᵀ λ and the response A⁻¹ Gᵀ λ in two vectors on the interface.
+    /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves their
+    /// forces Gᵀ λ on the interface. `a` is the matrix unless it is packed, `dofs` are the dofs of a part.
     pub(super) fn solve(
         &mut self,
-        (matrix, interface): (&EffectiveMatrix<T>, &[usize]),
-        (system, together): (&dyn System<T>, &Together<T>),
+        (a, dofs): (Option<SparseColMatRef<'_, usize, T>>, Option<&[usize]>),
+        together: &Together<T>,
         data: RowData<'_, T>,
         multipliers: &mut [T],
         (affordable, residual): (usize, f64),
-        [forces, response]: [&mut [T]; 2],
+        forces: &mut [T],
     ) -> Result<Outcome> {
-        let Self { product, is_packed, inverse, expected, space, deflates, cg, answered, .. } = self;
+        let Self { product, inverse, expected, space, deflates, cg, answered, .. } = self;
         answered.clear();
-        let mut body = OverRanks {
-            product,
-            is_packed: *is_packed,
-            space: space.as_mut().filter(|_| *deflates),
-            matrix,
-            system,
-            together,
-        };
+        let mut body = Matrix { product, space: space.as_mut().filter(|_| *deflates), a, dofs, together };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
         let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
@@ -223,39 +206,45 @@ impl<T: Real> Products<T> {
                 data.g.interface_scatter(row, lambda, forces);
             }
             memory::copy(answered, forces, "the forces of a contact problem")?;
-            let solution = cg.solution();
-            for (response, &dof) in response.iter_mut().zip(interface) {
-                *response = solution[dof];
-            }
         }
         Ok(outcome)
     }
 
+    /// The response A⁻¹ Gᵀ λ of the problem solved last, by dof.
+    pub(super) fn solution(&self) -> &[T] {
+        self.cg.solution()
+    }
+
     /// The response A⁻¹ f by dof, if f are the forces of the problem solved last.
     pub(super) fn response_to(&self, forces: &[T]) -> Option<&[T]> {
-        (self.answered == forces).then(|| self.cg.solution())
+        (self.answered == forces).then(|| self.solution())
     }
 }
 
-/// The effective matrix, of which each rank has the rows that it owns.
-struct OverRanks<'a, T: Real> {
+/// A matrix, of which each rank has the rows that it owns.
+struct Matrix<'a, T: Real> {
     product: &'a mut Product<T>,
-    is_packed: bool,
     space: Option<&'a mut CoarseSpace<T>>,
-    matrix: &'a EffectiveMatrix<T>,
-    system: &'a dyn System<T>,
+    /// None if the product has its entries.
+    a: Option<SparseColMatRef<'a, usize, T>>,
+    /// The dofs of a part of the system.
+    dofs: Option<&'a [usize]>,
     together: &'a Together<T>,
 }
 
-impl<T: Real> Body<T> for OverRanks<'_, T> {
+impl<T: Real> Body<T> for Matrix<'_, T> {
     fn multiply(&mut self, reach: usize, x: &[T], y: &mut [T]) -> Result<()> {
         // With a coarse space x reaches everywhere at once, and over ranks it comes from elsewhere.
         let reach = if self.together.is_alone() && self.space.is_none() { reach } else { usize::MAX };
-        match self.is_packed {
-            true => self.product.write_packed(reach, x, y),
-            false => self.product.write(T::one(), self.matrix.view(self.system), x, y),
+        match self.a {
+            None => self.product.write_packed(reach, x, y),
+            Some(a) => self.product.write(T::one(), a, x, y),
         }
         self.together.share(y)
+    }
+
+    fn number(&self, dof: usize) -> Option<usize> {
+        self.dofs.map_or(Some(dof), |dofs| dofs.binary_search(&dof).ok())
     }
 
     fn sum(&self, dofs: usize, part: &dyn Fn(Range<usize>) -> T) -> Result<T> {

@@ -1,11 +1,11 @@
 //! Dofs without mass, whose displacements follow from static balance with the others: their part of K, factorized.
 
 use crate::error::{Error, Result};
-use crate::linear_solver::{Automatic, Condensation, Factorization, LinearSolver};
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::simulation::build::program::CompiledStage;
 use crate::simulation::operator::Operator;
+use crate::simulation::operator::part::Part;
 use crate::simulation::operator::responses::Unit;
 use crate::sparse::{self, Combination};
 use crate::state::Motion;
@@ -24,13 +24,12 @@ pub(crate) struct MasslessBlock<T: Real> {
     pub(crate) stage: CompiledStage<T>,
     /// The dofs of the interface that have a mass, and their indices there.
     pub(crate) massive: Vec<(usize, usize)>,
-    /// The interface indices of its own dofs; the size of the interface for dofs that are not on it.
-    pub(crate) places: Vec<usize>,
     /// Version of the rows when rows on massless dofs were last found.
     pub(crate) sorted: u64,
 }
 
-/// Columns of K, one per massless dof: its couplings to all free dofs.
+/// Columns of K, one per massless dof: its couplings to all free dofs. Columns of a tangent keep entries that are zero:
+/// the dofs of a node have the same, and products are faster.
 #[derive(Debug)]
 pub(crate) struct Columns<T> {
     pointers: Vec<usize>,
@@ -68,7 +67,7 @@ impl<T: Real> Columns<T> {
                 let known = difference.abs() > rounding(x.abs().max(y.abs())).min(rounding(largest));
                 if known { difference / step } else { T::zero() }
             });
-            columns.push(differences.enumerate(), &free);
+            columns.push(differences.enumerate().filter(|&(_, value)| value != T::zero()), &free);
         }
         Ok(columns)
     }
@@ -98,7 +97,7 @@ impl<T: Real> Columns<T> {
     }
 
     fn push(&mut self, entries: impl Iterator<Item = (usize, T)>, free: &[bool]) {
-        for (row, value) in entries.filter(|&(row, value)| free[row] && value != T::zero()) {
+        for (row, value) in entries.filter(|&(row, _)| free[row]) {
             self.rows.push(row);
             self.values.push(value);
         }
@@ -123,7 +122,7 @@ impl<T: Real> Columns<T> {
     fn picked(&self, places: impl Iterator<Item = usize>, keeps: impl Fn(usize) -> bool) -> Self {
         let mut picked = Self { pointers: vec![0], rows: Vec::new(), values: Vec::new() };
         for j in places {
-            for (row, value) in self.column(j).filter(|&(row, _)| keeps(row)) {
+            for (row, value) in self.column(j).filter(|&(row, value)| value != T::zero() && keeps(row)) {
                 picked.rows.push(row);
                 picked.values.push(value);
             }
@@ -133,7 +132,7 @@ impl<T: Real> Columns<T> {
     }
 
     /// K_bb, in the numbering of `dofs`.
-    fn own(&self, dofs: &[usize]) -> Result<SparseColMat<usize, T>> {
+    pub(crate) fn own(&self, dofs: &[usize]) -> Result<SparseColMat<usize, T>> {
         let (mut pointers, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
         for j in 0..dofs.len() {
             for (row, value) in self.column(j) {
@@ -152,119 +151,6 @@ impl<T: Real> Columns<T> {
         let mut values = vec![T::zero(); sum.len()];
         sum.fill(&[(T::one(), own.val())], None, &mut values);
         Ok(sum.into_matrix(values))
-    }
-}
-
-/// A factor of K_bb that solves for vectors of the whole system, and of its whole interface: other dofs do not
-/// respond.
-#[derive(Debug)]
-pub(crate) struct Embedded<T> {
-    inner: Box<dyn Factorization<T>>,
-    dofs: Vec<usize>,
-    /// Interface indices of its own dofs, ascending, and the number of all dofs there.
-    places: Vec<usize>,
-    interface: usize,
-    /// Scratch: one entry per own dof, and one per own dof on the interface.
-    vector: Vec<T>,
-    on_interface: Vec<T>,
-}
-
-fn gather<T: Copy>(all: &[T], places: &[usize], some: &mut [T]) {
-    for (x, &place) in some.iter_mut().zip(places) {
-        *x = all[place];
-    }
-}
-
-fn scatter<T: Copy>(some: &[T], places: &[usize], all: &mut [T]) {
-    for (&x, &place) in some.iter().zip(places) {
-        all[place] = x;
-    }
-}
-
-impl<T: Real> Factorization<T> for Embedded<T> {
-    fn factorize(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<()> {
-        let dofs = &self.dofs;
-        self.inner.factorize(a).map_err(|error| match error {
-            Error::Singular { dof, .. } => Error::Singular {
-                matrix: "stiffness of the dofs without mass",
-                dof: dofs.get(dof).copied().unwrap_or(dof),
-            },
-            other => other,
-        })
-    }
-
-    /// Entries of other dofs are left as they are.
-    fn solve(&mut self, rhs: &mut [T]) -> Result<()> {
-        gather(rhs, &self.dofs, &mut self.vector);
-        self.inner.solve(&mut self.vector)?;
-        scatter(&self.vector, &self.dofs, rhs);
-        Ok(())
-    }
-
-    fn stored_values(&self) -> usize {
-        self.inner.stored_values()
-    }
-
-    fn condensation(&mut self) -> Option<&mut dyn Condensation<T>> {
-        Some(self)
-    }
-}
-
-impl<T: Real> Condensation<T> for Embedded<T> {
-    fn condense(&mut self, rhs: &[T], interface: &mut [T]) -> Result<()> {
-        let Self { inner, dofs, places, vector, on_interface, .. } = self;
-        gather(rhs, dofs, vector);
-        interface.fill(T::zero());
-        match inner.condensation().filter(|_| !places.is_empty()) {
-            Some(condensed) => condensed.condense(vector, on_interface)?,
-            None => inner.solve(vector)?,
-        }
-        scatter(on_interface, places, interface);
-        Ok(())
-    }
-
-    /// Entries of other dofs are left as they are.
-    fn expand(&mut self, interface: &[T], solution: &mut [T]) -> Result<()> {
-        let Self { inner, dofs, places, vector, on_interface, .. } = self;
-        gather(interface, places, on_interface);
-        if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-            condensed.expand(on_interface, vector)?;
-        }
-        scatter(vector, dofs, solution);
-        Ok(())
-    }
-
-    fn solve(&mut self, forces: &mut [T]) -> Result<()> {
-        let Self { inner, places, on_interface, interface, .. } = self;
-        for column in forces.chunks_exact_mut((*interface).max(1)) {
-            gather(column, places, on_interface);
-            column.fill(T::zero());
-            if let Some(condensed) = inner.condensation().filter(|_| !places.is_empty()) {
-                condensed.solve(on_interface)?;
-                scatter(on_interface, places, column);
-            }
-        }
-        Ok(())
-    }
-}
-
-impl<T: Real> Embedded<T> {
-    /// K_bb from its columns, factorized.
-    pub(crate) fn factorized(columns: &Columns<T>, dofs: &[usize], interface: &[usize]) -> Result<Self> {
-        let own = columns.own(dofs)?;
-        let shared =
-            interface.iter().enumerate().filter_map(|(place, dof)| Some((place, dofs.binary_search(dof).ok()?)));
-        let (places, last): (Vec<usize>, Vec<usize>) = shared.unzip();
-        let mut factor = Self {
-            inner: Automatic.analyze(own.symbolic(), &last)?,
-            dofs: dofs.to_vec(),
-            on_interface: vec![T::zero(); places.len()],
-            places,
-            interface: interface.len(),
-            vector: vec![T::zero(); dofs.len()],
-        };
-        factor.factorize(own.as_ref())?;
-        Ok(factor)
     }
 }
 
@@ -303,15 +189,14 @@ impl<T: Real> MasslessBlock<T> {
         interface: &[usize],
     ) -> Result<Self> {
         let columns = Columns::of(system, dofs, at)?;
-        let factor = Embedded::factorized(&columns, dofs, interface)?;
+        let part = Part::factorized(columns.own(dofs)?, dofs, interface)?;
         let massive = interface.iter().enumerate().filter(|(_, dof)| dofs.binary_search(dof).is_err());
         Ok(Self {
             dofs: dofs.to_vec(),
             columns: columns.without(dofs),
-            operator: Operator::of_part(Box::new(factor), interface, Unit::Dof)?,
+            operator: Operator::of_part(part, interface, Unit::Dof)?,
             stage: CompiledStage::of_displacements(),
             massive: massive.map(|(place, &dof)| (dof, place)).collect(),
-            places: dofs.iter().map(|dof| interface.binary_search(dof).unwrap_or(interface.len())).collect(),
             sorted: 0,
         })
     }

@@ -1,67 +1,37 @@
 //! Dofs without mass in an explicit stage: brought into static balance before the other dofs are solved for.
 
-use crate::contact::Candidates;
 use crate::corrector::Gaps;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::{STATIC_INCREMENT, rounding};
 use crate::simulation::rows::massless_rows::Problem;
 use crate::simulation::stage::massless::MasslessBlock;
 use crate::simulation::stage::vectors::StageVectors;
 use crate::simulation::stage::{Host, StageSolve};
 
-/// Maximum number of linearizations of rows.
-const LINEARIZATIONS: usize = 20;
-
 impl<'a, T: Real> StageSolve<'_, 'a, T> {
     /// Brings dofs without mass into static balance with the predicted displacements of the others, and with contact.
     /// The residual in `vectors.increment` becomes the residual of the other dofs in this configuration. Contacts on
     /// dofs without mass may act on other dofs too: these forces are added to it.
-    ///
-    /// The balance is linear, gaps may be curved: rows are linearized again until the displacements converge.
     pub(crate) fn balance_massless(&mut self, block: &mut MasslessBlock<T>) -> Result<()> {
         self.contact.rows.massless.problem = Problem::Static;
         (block.stage.load, block.stage.end) = (self.stage.load, self.stage.end);
-        let mut first = T::zero();
-        for iteration in 0..LINEARIZATIONS {
-            self.sort_rows(block)?;
-            block.operator.follow(self.constraints.version());
-            let converged = self.of_block(block).solve_linearized()?;
-            self.refuse_not_converged(converged)?;
-            let (largest, scale) = self.move_massless(block)?;
-            if iteration == 0 {
-                first = largest;
-            }
-            let moved = self.constraints.follow(self.new.t, &self.new.u, self.g)?;
-            let StageVectors { increment, balance, .. } = &mut *self.vectors;
-            let forces = &self.contact.interface.forces;
-            let converged = iteration > 0 && largest <= rounding(scale) + T::of(STATIC_INCREMENT) * first;
-            if moved == Candidates::Unchanged || converged {
-                for &(dof, place) in &block.massive {
-                    increment[dof] += forces[place];
-                }
-                if let Some(balance) = balance {
-                    for &dof in &block.dofs {
-                        balance.u[dof] = self.new.u[dof];
-                    }
-                }
-                self.operator.follow(self.constraints.version());
-                return self.sort_rows(block);
-            }
-            // The residual without contact is the negative of the contact forces that balance it.
-            for (&dof, &place) in block.dofs.iter().zip(&block.places) {
-                increment[dof] = if place < forces.len() { -forces[place] } else { T::zero() };
+        self.sort_rows(block)?;
+        block.operator.follow(self.constraints.version());
+        let converged = self.of_block(block).solve_linearized()?;
+        self.refuse_not_converged(converged)?;
+        self.move_massless(block)?;
+        self.constraints.follow(self.new.t, &self.new.u, self.g)?;
+        let StageVectors { increment, balance, .. } = &mut *self.vectors;
+        for &(dof, place) in &block.massive {
+            increment[dof] += self.contact.interface.forces[place];
+        }
+        if let Some(balance) = balance {
+            for &dof in &block.dofs {
+                balance.u[dof] = self.new.u[dof];
             }
         }
-        let (t, h) = (self.clock.at(0.0), self.clock.h);
-        Err(Error::NewtonNotConverged {
-            t,
-            h,
-            iterations: LINEARIZATIONS,
-            residual: 0.0,
-            increment: if first > T::zero() { 1.0 } else { 0.0 },
-            dof: block.dofs[0],
-        })
+        self.operator.follow(self.constraints.version());
+        self.sort_rows(block)
     }
 
     /// The static balance of the dofs without mass, as a stage of its own.
@@ -82,11 +52,9 @@ impl<'a, T: Real> StageSolve<'_, 'a, T> {
         }
     }
 
-    /// Moves the dofs without mass by the increment, and updates the residual of the others. Returns the largest
-    /// increment and the largest displacement.
-    fn move_massless(&mut self, block: &MasslessBlock<T>) -> Result<(T, T)> {
+    /// Moves the dofs without mass by the increment, and updates the residual of the others.
+    fn move_massless(&mut self, block: &MasslessBlock<T>) -> Result<()> {
         let (increment, u) = (&mut self.vectors.increment, &mut self.new.u);
-        let (mut largest, mut scale) = (T::zero(), T::zero());
         for (j, &dof) in block.dofs.iter().enumerate() {
             let d = std::mem::replace(&mut increment[dof], T::zero());
             if !d.is_finite() {
@@ -94,12 +62,11 @@ impl<'a, T: Real> StageSolve<'_, 'a, T> {
                 return Err(Error::StepNotFinite { t, h, what: "the increment", dof, value });
             }
             u[dof] += d;
-            (largest, scale) = (largest.max(d.abs()), scale.max(u[dof].abs()));
             for (row, k) in block.columns.column(j) {
                 increment[row] -= k * d;
             }
         }
-        Ok((largest, scale))
+        Ok(())
     }
 
     /// Finds the rows that act on dofs without mass. Refuses laws there that depend on more than the gap, and

@@ -223,7 +223,7 @@ impl<T: Real> Start<'_, '_, T> {
                     Columns::of_damping(&mut **system, &dofs, motion)?
                 }
             };
-            let factor = Box::new(factorize(&columns, &dofs, parts, &interface)?);
+            let factor = factorize(&columns, &dofs, parts, &interface)?;
             let mut operator = Operator::of_part(factor, &interface, Unit::Row)?;
             operator.begin(&mut increment, &mut on_interface)?;
             let level = match unknown {

@@ -5,7 +5,8 @@ use crate::error::{Error, Result};
 use crate::linear_solver::components;
 use crate::ranks::Together;
 use crate::real::Real;
-use crate::simulation::stage::massless::{Columns, Embedded, damping_forces};
+use crate::simulation::operator::part::{Embedded, Part};
+use crate::simulation::stage::massless::{Columns, damping_forces};
 use crate::system::System;
 use faer::sparse::SymbolicSparseColMat;
 
@@ -79,9 +80,12 @@ pub(super) fn factorize<T: Real>(
     parts: &mut Vec<Vec<usize>>,
     interface: &[usize],
 ) -> Result<Embedded<T>> {
-    Embedded::factorized(columns, dofs, interface).inspect_err(|_| {
+    let factorized = |columns: &Columns<T>, dofs: &[usize], interface: &[usize]| {
+        Part::factorized(columns.own(dofs)?, dofs, interface)
+    };
+    factorized(columns, dofs, interface).inspect_err(|_| {
         let count = parts.len();
-        let factor = |part: &Vec<usize>| Embedded::factorized(&columns.of_part(dofs, part), part, &[]);
+        let factor = |part: &Vec<usize>| factorized(&columns.of_part(dofs, part), part, &[]);
         parts.retain(|part| count > 1 && factor(part).is_ok());
         if parts.len() == count {
             // By rounding, each part is definite and all parts together are not.
