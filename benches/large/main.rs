@@ -7,6 +7,8 @@
 //!   factor; the figure goes to `target/large/courant.svg`.
 //! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
 //! - `-- explicit [cells a side]…` (default 60 and 100): the slab by CD-Lagrange, beside its steps without contact.
+//! - `-- flat [cells a side]…` (default 10, 20 and 40): the slab, without lateral strain, on a flat floor, beside the
+//!   exact solution; `in_mujoco.py` runs the same scene by MuJoCo.
 //! - `-- picture [cells a side]` (default 100): the slab some time after first contact, in `target/large/slab.vtu`, which
 //!   `picture.py` draws with ParaView.
 
@@ -15,9 +17,10 @@ mod picture;
 
 use contact_dynamics::contact::GapFunction;
 use contact_dynamics::contact_solver::Assembly;
+use contact_dynamics::mass::Redistribution;
 use contact_dynamics::{
-    ActiveSet, CdLagrange, Cholesky, ConjugateGradients, GeneralizedAlpha, LinearRows, LinearSystem, Result,
-    Simulation, SimulationBuilder, TimeIntegrator,
+    ActiveSet, CdLagrange, Cholesky, ConjugateGradients, GeneralizedAlpha, LinearRows, LinearSystem, Mass, Preset,
+    Result, Simulation, SimulationBuilder, System, TimeIntegrator, mass,
 };
 use contact_dynamics_scenes::solids::Material;
 use example_support::plot::{Axis, BLUE, Curve, Panel, SKY, VERMILION, pair};
@@ -42,6 +45,8 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         Ok(exact(&Arguments::read(&[46], &[6]))?)
     } else if is_given("explicit") {
         Ok(explicit(&Arguments::read(&[60, 100], &[6]))?)
+    } else if is_given("flat") {
+        Ok(flat(&Arguments::read(&[10, 20, 40], &[6]))?)
     } else if is_given("picture") {
         picture(&Arguments::read(&[100], &[6]))
     } else {
@@ -78,8 +83,7 @@ fn step(grid: &Grid, courant: f64) -> f64 {
 
 /// A slab that falls on a floor with waves, whose crests it touches after two steps.
 fn falling(grid: &Grid, h: f64) -> Result<SimulationBuilder<'static, f64>> {
-    let system = LinearSystem::lumped(grid.mass(), grid.stiffness())?;
-    Ok(thrown((grid, system), GeneralizedAlpha::default(), h))
+    Ok(thrown((grid, lumped(grid)?), GeneralizedAlpha::default(), h))
 }
 
 /// The same slab with a weight that keeps it on the floor.
@@ -324,14 +328,36 @@ fn picture(arguments: &Arguments) -> std::result::Result<(), Box<dyn std::error:
     Ok(())
 }
 
+fn lumped(grid: &Grid) -> Result<LinearSystem<'static, f64>> {
+    LinearSystem::lumped(grid.mass(), grid.stiffness())
+}
+
+/// The slab without mass on its lower side, as [`Preset::explicit`] wants it.
+fn massless(grid: &Grid) -> Result<LinearSystem<'static, f64>> {
+    let stiffness = grid.stiffness();
+    let contact: Vec<usize> =
+        grid.bottom().flat_map(|place| [0, 1, 2].map(|axis| 3 * grid.node(place) + axis)).collect();
+    let groups: Vec<usize> = (0..grid.dofs()).map(|dof| dof % 3).collect();
+    let by = Redistribution::Tapered { neighbors: stiffness.symbolic(), fraction: 0.15 };
+    let mass = mass::redistribute(&grid.mass(), &contact, &groups, by)?;
+    LinearSystem::lumped(mass, stiffness)
+}
+
 /// Times of steps before and after the first contact, and the largest change of the energy.
 fn explicit(arguments: &Arguments) -> Result<()> {
     println!("CD-Lagrange, Courant number 0.5");
-    println!("{:>8} {:>7} {:>8} {:>8} {:>7} {:>15}", "dofs", "closed", "open, s", "step, s", "ratio", "energy changes");
-    for &cells in &arguments.sizes {
+    println!(
+        "{:<16} {:>8} {:>7} {:>9} {:>8} {:>8} {:>7} {:>15} {:>9}",
+        "mass", "dofs", "closed", "products", "open, s", "step, s", "ratio", "energy changes", "peak, GiB"
+    );
+    for (&cells, preset) in arguments.sizes.iter().flat_map(|cells| [(cells, false), (cells, true)]) {
         let grid = slab(cells);
-        let system = LinearSystem::lumped(grid.mass(), grid.stiffness())?;
-        let mut run = thrown((&grid, system), CdLagrange, step(&grid, 0.5)).uncorrected().build()?;
+        let mut run = if preset {
+            thrown((&grid, massless(&grid)?), CdLagrange, step(&grid, 0.5)).correctors(Preset::explicit().correctors())
+        } else {
+            thrown((&grid, lumped(&grid)?), CdLagrange, step(&grid, 0.5)).uncorrected()
+        }
+        .build()?;
         let start = run.energy().total();
         let (mut open, mut pressed, mut most, mut change) = (Vec::new(), Vec::new(), 0, 0.0_f64);
         while pressed.len() < arguments.repeated(60) {
@@ -343,13 +369,77 @@ fn explicit(arguments: &Arguments) -> Result<()> {
             change = change.max((run.energy().total() / start - 1.0).abs());
             if most == 0 { &mut open } else { &mut pressed }.push(time);
         }
+        let products = run.statistics().contact_products as f64 / pressed.len() as f64;
         let [open, pressed] = [&open, &pressed].map(|times| median(times));
         println!(
-            "{:>8} {most:>7} {open:>8.4} {pressed:>8.4} {:>7.2} {:>14.2} %",
+            "{:<16} {:>8} {most:>7} {products:>9.1} {open:>8.4} {pressed:>8.4} {:>7.2} {:>13.2} % {:>9.2}",
+            if preset { "none at contact" } else { "lumped" },
             grid.dofs(),
             pressed / open,
-            100.0 * change
+            100.0 * change,
+            memory()
         );
+    }
+    Ok(())
+}
+
+/// A slab with Poisson's ratio 0 on a flat floor is a bar of thickness H: for 2 H/c the floor carries ρ c times velocity
+/// and area, then the slab leaves with the velocity of the fall. Both are 1 in the table.
+fn flat(arguments: &Arguments) -> Result<()> {
+    println!(
+        "{:<13} {:>8} {:>8} {:>8} {:>8} {:>8} {:>11} {:>14}",
+        "scheme", "dofs", "Courant", "open, s", "step, s", "rebound", "mean force", "largest force"
+    );
+    for &cells in &arguments.sizes {
+        let grid = Grid { material: Material { poisson: 0.0, ..MATERIAL }, ..slab(cells) };
+        let area = grid.cells[0] * grid.cells[1];
+        for (scheme, courant) in [("Chung-Hulbert", 1.0), ("CD-Lagrange", 0.5), ("preset", 0.5)] {
+            let h = courant * grid.size / grid.material.wave_speed();
+            let system = match scheme {
+                "preset" => massless(&grid)?,
+                _ => lumped(&grid)?,
+            };
+            let Mass::Lumped(mass) = system.mass() else { unreachable!("all masses are lumped") };
+            let mass = mass.to_vec();
+            let gap = 1.5 * SPEED * h;
+            let floor = grid
+                .bottom()
+                .fold(LinearRows::new(), |rows, place| rows.unilateral(&[(3 * grid.node(place) + 2, 1.0)], gap));
+            let velocity = (0..grid.dofs()).map(|dof| if dof % 3 == 2 { -SPEED } else { 0.0 }).collect();
+            let mut run = match scheme {
+                "Chung-Hulbert" => Simulation::builder(system, GeneralizedAlpha::default(), h)
+                    .linear_solver(ConjugateGradients::default()),
+                "CD-Lagrange" => Simulation::builder(system, CdLagrange, h).uncorrected(),
+                _ => Simulation::builder(system, CdLagrange, h).correctors(Preset::explicit().correctors()),
+            }
+            .velocity(velocity)
+            .constraint(floor)
+            .build()?;
+            let momentum = |run: &Simulation<'_, f64>| {
+                let downward = mass.iter().zip(run.state().velocity()).skip(2).step_by(3);
+                downward.map(|(mass, velocity)| mass * velocity).sum::<f64>()
+            };
+            let (mut times, mut forces) = ([Vec::new(), Vec::new()], Vec::new());
+            let mut last = momentum(&run);
+            for _ in 0..grid.cells[2] * if courant < 1.0 { 6 } else { 3 } {
+                let start = Instant::now();
+                run.step()?;
+                let time = start.elapsed().as_secs_f64();
+                times[usize::from(closed(&run) > 0)].push(time);
+                let now = momentum(&run);
+                forces.push((now - last) / (h * SPEED * area as f64));
+                last = now;
+            }
+            forces.retain(|force| force.abs() > 0.01);
+            let largest = forces.iter().fold(0.0, |most: f64, force| most.max(*force));
+            let [open, pressed] = times.map(|times| median(&times));
+            println!(
+                "{scheme:<13} {:>8} {courant:>8.1} {open:>8.4} {pressed:>8.4} {:>8.3} {:>11.3} {largest:>14.3}",
+                grid.dofs(),
+                last / (SPEED * mass.iter().skip(2).step_by(3).sum::<f64>()),
+                forces.iter().sum::<f64>() / forces.len() as f64
+            );
+        }
     }
     Ok(())
 }
