@@ -11,7 +11,6 @@ mod many_rows;
 mod pivoting;
 mod problem;
 mod projected_cg;
-mod projected_gradient;
 mod structure;
 mod sweeps;
 
@@ -22,7 +21,6 @@ pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
 pub use problem::{AdmissibleSet, ContactProblem};
 pub(crate) use projected_cg::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
-pub use projected_gradient::ProjectedGradient;
 
 use crate::real::Real;
 

@@ -7,7 +7,7 @@
 use crate::contact::{Capsule, Cone, Cuboid, Cylinder, GapFunction, Obstacle, Plane, Sphere};
 #[cfg(feature = "mesh-contact")]
 use crate::contact::{ClosedSurface, EdgeToEdge, Mortar, NodeToFacet, Tie};
-use crate::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
+use crate::contact_solver::{GaussSeidel, Pivoting};
 use crate::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, WorkBalance,
     ZeroAcceleration,
@@ -65,7 +65,7 @@ pub fn instances() -> Vec<*const ()> {
     #[cfg(feature = "mesh-contact")]
     all.extend(by_trait!(dyn Obstacle<f64, 3>: ClosedSurface<f64, 3>));
     all.extend(by_trait!(dyn ContactSolver<f64>:
-        ActiveSet<f64>, GaussSeidel<f64>, Pivoting<f64>, ProjectedGradient<f64>));
+        ActiveSet<f64>, GaussSeidel<f64>, Pivoting<f64>));
     all.extend(by_trait!(dyn LinearSolver<f64>:
         Automatic, ByBody<'static, f64>, Cholesky, ConjugateGradients, Diagonal, Lu, Tridiagonal));
     all.extend(by_trait!(dyn Corrector<f64>:

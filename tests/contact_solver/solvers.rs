@@ -1,7 +1,7 @@
 //! The contact solvers on their own: against each other, against closed forms, and where they must refuse.
 
 use contact_dynamics::contact_solver::{
-    ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
+    ActiveSet, AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting,
 };
 use contact_dynamics::{Error, LinearRows, Newmark, Real, Simulation};
 use contact_dynamics_scenes::random::Congruential;
@@ -116,7 +116,6 @@ fn general<T: Real>() -> Vec<Listed<T>> {
     vec![
         ("Gauss-Seidel", Box::new(GaussSeidel::default().sweeps(SWEEPS)), 1e-9),
         ("relaxed Gauss-Seidel", Box::new(GaussSeidel::new(1.3).unwrap().sweeps(SWEEPS)), 1e-9),
-        ("projected gradient", Box::new(ProjectedGradient::default()), 1e-9),
         ("pivoting", Box::new(Pivoting::default()), 1e-12),
         ("active set", Box::new(ActiveSet::default()), 1e-12),
     ]
@@ -306,9 +305,6 @@ fn free_rows_twice_are_one_if_they_agree() {
         assert!(solve(&mut *solver, &twice(4.0001), &[0.0; 2]).is_err(), "{name}");
     }
     assert_eq!(solve(&mut Pivoting::default(), &twice(4.0), &[0.0; 2]), Ok((vec![-2.0, 0.0], 1)));
-    // The multipliers that each documents: the nearest to the guess.
-    let (found, _) = solve(&mut ProjectedGradient::default(), &twice(4.0), &[3.0, 1.0]).unwrap();
-    assert!(found[0].abs() < 1e-11 && (found[1] + 2.0).abs() < 1e-11, "{found:?}");
 }
 
 #[test]
@@ -417,7 +413,6 @@ fn problems_without_a_solution_are_refused() {
     let mut numbers = Congruential(9);
     let mut solvers: Vec<Listed<f64>> = vec![
         ("Gauss-Seidel", Box::new(GaussSeidel::default().sweeps(300)), 0.0),
-        ("projected gradient", Box::new(ProjectedGradient::default().iterations(300)), 0.0),
         ("pivoting", Box::new(Pivoting::default()), 0.0),
         ("active set", Box::new(ActiveSet::default()), 0.0),
     ];
@@ -552,17 +547,13 @@ fn single_precision_judges_many_coupled_rows() {
 #[test]
 fn limits_are_kept_and_told() {
     let (problem, _) = random(&mut Congruential(10), 20, 20, 42, 0.0);
-    let solvers: [Box<dyn ContactSolver<f64>>; 2] =
-        [Box::new(GaussSeidel::default().sweeps(3)), Box::new(ProjectedGradient::default().iterations(3))];
-    for mut solver in solvers {
-        let mut multipliers = [0.0; 20];
-        let failure = solver.solve(&problem.view(), &mut multipliers);
-        let (worst, expected) = problem.view().residual(&multipliers);
-        let Err(ContactFailure::NotConverged { iterations: 3, row, residual }) = failure else {
-            panic!("{failure:?}");
-        };
-        assert!(row == worst && (residual - expected).abs() < 1e-12 * problem.scale());
-    }
+    let mut multipliers = [0.0; 20];
+    let failure = GaussSeidel::default().sweeps(3).solve(&problem.view(), &mut multipliers);
+    let (worst, expected) = problem.view().residual(&multipliers);
+    let Err(ContactFailure::NotConverged { iterations: 3, row, residual }) = failure else {
+        panic!("{failure:?}");
+    };
+    assert!(row == worst && (residual - expected).abs() < 1e-12 * problem.scale());
     let rough = solve(&mut GaussSeidel::default().tolerance(1e-3).unwrap(), &problem, &[0.0; 20]).unwrap();
     let fine = solve(&mut GaussSeidel::default(), &problem, &[0.0; 20]).unwrap();
     assert!(rough.1 < fine.1 && problem.residual(&rough.0) <= 1e-3, "{} {}", rough.1, fine.1);
@@ -571,7 +562,6 @@ fn limits_are_kept_and_told() {
     }
     for refused in [-1e-3, 1.0, f64::NAN] {
         assert!(GaussSeidel::<f64>::default().tolerance(refused).is_err());
-        assert!(ProjectedGradient::<f64>::default().tolerance(refused).is_err());
     }
 }
 

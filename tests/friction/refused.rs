@@ -3,7 +3,7 @@
 use super::{masses, run};
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapRates, Rates};
 use contact_dynamics::contact_solver::{
-    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient,
+    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting,
 };
 use contact_dynamics::corrector::Release;
 use contact_dynamics::{CentralDifference, Error, LinearRows, Newmark, Result, SimulationBuilder, TchamwaWielgosz};
@@ -45,7 +45,6 @@ fn what_cannot_be_served_is_refused() {
         (scene().constraint(floor(ContactLaw::RateCondition, 0.3)), "laws of one instant that only press"),
         (scene().constraint(LinearRows::new().unilateral(&[(1, 1.0)], 0.0).friction(0.3, &[])), "no tangent"),
         (scene().constraint(rigid()).contact_solver(Pivoting::default()), "choose `ActiveSet`"),
-        (scene().constraint(rigid()).contact_solver(ProjectedGradient::default()), "choose `ActiveSet`"),
         (scene().constraint(rigid()).corrector(Release), "does not support friction"),
         (explicit().constraint(rigid()), "taken"),
         (explicit().constraint(floor(ContactLaw::Penalty { stiffness: 10.0 }, 0.3)), "taken"),

@@ -1,7 +1,7 @@
 //! The hard cases of impact in one dimension: dissimilar bars, touching without pressure, bounces, rest, extreme ratios
 //! and redundant contacts.
 
-use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{GaussSeidel, Pivoting};
 use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{
     ActiveSet, Composite, ContactSolver, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation,
@@ -283,7 +283,6 @@ fn redundant_contacts_give_the_motion_of_one() {
         compare(redundant(copies, ActiveSet::default()), 1e-9, "active set");
         compare(redundant(copies, Pivoting::default()), 1e-9, "pivoting");
         compare(redundant(copies, GaussSeidel::default()), 1e-6, "Gauss-Seidel");
-        compare(redundant(copies, ProjectedGradient::default()), 1e-6, "projected gradient");
     }
 }
 

@@ -2,7 +2,7 @@
 //! zones, a soft disc.
 
 use contact_dynamics::contact::{Plane, Side, Sphere};
-use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{GaussSeidel, Pivoting};
 use contact_dynamics::{
     Automatic, Composite, ContactLaw, LinearSolver, Newmark, NodesOnObstacle, PersistencyCorrection, Simulation,
     TimeIntegrator,
@@ -50,13 +50,9 @@ fn all_contact_solvers_land_the_block_alike() {
         let pivoting = drop.run_with(Pivoting::default()).unwrap();
         let difference = (exact.largest_force / pivoting.largest_force - 1.0).abs();
         assert!(difference < 1e-10, "{landing:?}, pivoting: {difference:e}");
-        for (name, other) in [
-            ("Gauss-Seidel", drop.run_with(GaussSeidel::default())),
-            ("projected gradient", drop.run_with(ProjectedGradient::default())),
-        ] {
-            let difference = (exact.largest_force / other.unwrap().largest_force - 1.0).abs();
-            assert!(difference < 1e-8, "{landing:?}, {name}: {difference:e}");
-        }
+        let sweeps = drop.run_with(GaussSeidel::default()).unwrap();
+        let difference = (exact.largest_force / sweeps.largest_force - 1.0).abs();
+        assert!(difference < 1e-8, "{landing:?}, Gauss-Seidel: {difference:e}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a host may move to another thread, and what it may share between threads; checked by the compiler.
 
 use contact_dynamics::contact::ContactId;
-use contact_dynamics::contact_solver::{ContactFailure, GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{ContactFailure, GaussSeidel, Pivoting};
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
@@ -56,7 +56,7 @@ fn parts_of_the_crate_are_moved_and_shared() {
     shared::<(PersistencyCorrection, ContactImplicit, ContactStabilized, LaursenLove, Release)>();
     shared::<(TaylorPapadopoulos, ZeroAcceleration, NonsmoothSplitting)>();
     shared::<(Automatic, Cholesky, Diagonal, Tridiagonal, Lu, ConjugateGradients)>();
-    shared::<(ActiveSet<f64>, Pivoting<f64>, GaussSeidel, ProjectedGradient<f64>)>();
+    shared::<(ActiveSet<f64>, Pivoting<f64>, GaussSeidel)>();
     shared::<(Interface<f64>, Side<'static, f64>, Assembled<f64>, Coupling<f64>)>();
 }
 

@@ -2,7 +2,7 @@
 //! `src/instances.rs` of the crate does it in double precision: here, so that the crate itself builds as fast as before.
 
 use contact_dynamics::contact::{ContactConstraint, GapFunction, LinearRows, NodesOnObstacle};
-use contact_dynamics::contact_solver::{ActiveSet, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{ActiveSet, ContactSolver, GaussSeidel, Pivoting};
 use contact_dynamics::corrector::{LaursenLove, NonsmoothSplitting, Release};
 use contact_dynamics::{
     Automatic, Cholesky, ConjugateGradients, Corrector, Diagonal, LinearSolver, LinearSystem, Lu,
@@ -30,7 +30,7 @@ pub fn instances() -> Vec<*const ()> {
     all.extend(by_trait!(dyn ContactConstraint<f32>:
         LinearRows<'static, f32>, NodesOnObstacle<'static, f32, 2>, GapFunction<'static, f32>));
     all.extend(by_trait!(dyn ContactSolver<f32>:
-        ActiveSet<f32>, GaussSeidel<f32>, Pivoting<f32>, ProjectedGradient<f32>));
+        ActiveSet<f32>, GaussSeidel<f32>, Pivoting<f32>));
     all.extend(by_trait!(dyn LinearSolver<f32>:
         Automatic, Cholesky, ConjugateGradients, Diagonal, Lu, Tridiagonal));
     all.extend(by_trait!(dyn Corrector<f32>: LaursenLove, NonsmoothSplitting, PersistencyCorrection, Release));

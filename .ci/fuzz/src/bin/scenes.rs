@@ -4,7 +4,7 @@
 #![no_main]
 
 use contact_dynamics::contact::{GapOffset, Plane, Side, Sphere};
-use contact_dynamics::contact_solver::{GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{GaussSeidel, Pivoting};
 use contact_dynamics::{
     Automatic, Cholesky, ConjugateGradients, ContactLaw, Diagonal, Error, InitialOverclosure, LinearRows, LinearSystem,
     Lu, NodesOnObstacle, Result, Simulation, SimulationBuilder, StepControl, Tridiagonal,
@@ -90,7 +90,6 @@ fn scene(input: &mut Input<'_>) -> Result<SimulationBuilder<'static, f64>> {
     builder = match input.below(8) {
         0 => builder.contact_solver(GaussSeidel::default()),
         1 => builder.contact_solver(Pivoting::default()),
-        2 => builder.contact_solver(ProjectedGradient::default()),
         _ => builder,
     };
     builder = match input.below(10) {

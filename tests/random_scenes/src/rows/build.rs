@@ -4,7 +4,7 @@ use super::nonlinear::Nonlinear;
 use super::recipe::{Contacting, Control, Element, Recipe, Row, Solving, Support, Tangent};
 use super::rubber::Triangle;
 use contact_dynamics::contact::{ContactLaw, GapOffset};
-use contact_dynamics::contact_solver::{ActiveSet, Assembly, ContactSolver, GaussSeidel, Pivoting, ProjectedGradient};
+use contact_dynamics::contact_solver::{ActiveSet, Assembly, ContactSolver, GaussSeidel, Pivoting};
 use contact_dynamics::{
     ByBody, Cholesky, ConjugateGradients, LinearRows, LinearSolver, LinearSystem, Lu, Newton, Real, Result, Simulation,
     SimulationBuilder, StepControl, System, Tridiagonal,
@@ -47,7 +47,6 @@ impl Recipe {
             Contacting::Default => None,
             Contacting::Pivoting => Some(Box::new(Pivoting::default())),
             Contacting::GaussSeidel => Some(Box::new(GaussSeidel::default())),
-            Contacting::ProjectedGradient => Some(Box::new(ProjectedGradient::default())),
             Contacting::WithoutW => Some(Box::new(ActiveSet::default().with_assembly(Assembly::Never))),
         };
         if let Some(solver) = solver {

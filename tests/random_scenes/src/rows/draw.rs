@@ -238,8 +238,8 @@ fn correction(random: &mut Congruential) -> Correction {
 }
 
 fn contact_solver(random: &mut Congruential) -> Contacting {
-    use Contacting::{Default, GaussSeidel, Pivoting, ProjectedGradient};
-    pick(&[Default, Default, Default, Default, Default, Pivoting, Pivoting, GaussSeidel, ProjectedGradient], random)
+    use Contacting::{Default, GaussSeidel, Pivoting};
+    pick(&[Default, Default, Default, Default, Default, Pivoting, Pivoting, GaussSeidel, GaussSeidel], random)
 }
 
 fn linear_solver(kind: &str, random: &mut Congruential) -> Solving {

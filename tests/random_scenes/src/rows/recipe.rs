@@ -152,7 +152,6 @@ pub enum Contacting {
     Default,
     Pivoting,
     GaussSeidel,
-    ProjectedGradient,
     /// Projected conjugate gradients wherever they are possible.
     WithoutW,
 }
@@ -160,7 +159,7 @@ pub enum Contacting {
 impl Contacting {
     /// Whether forces are found by an iteration that ends at a tolerance.
     pub fn iterates(self) -> bool {
-        matches!(self, Self::GaussSeidel | Self::ProjectedGradient | Self::WithoutW)
+        matches!(self, Self::GaussSeidel | Self::WithoutW)
     }
 }
 
