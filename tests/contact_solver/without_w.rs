@@ -7,7 +7,7 @@ use contact_dynamics::corrector::WorkBalance;
 use contact_dynamics::mass::{self, Redistribution};
 use contact_dynamics::{
     ActiveSet, Automatic, CdLagrange, Composite, ConjugateGradients, ContactStatus, Error, GeneralizedAlpha,
-    LinearRows, LinearSolver, LinearSystem, PersistencyCorrection, Real, Simulation, System, TimeIntegrator,
+    LinearRows, LinearSolver, LinearSystem, PersistencyCorrection, Real, Simulation, State, System, TimeIntegrator,
 };
 use contact_dynamics_scenes::hyperelastic::{Hyperelastic, Law};
 use contact_dynamics_scenes::solids::{Material, Solid};
@@ -56,10 +56,7 @@ fn compare<S: System<f64> + 'static>(
                 // Rows that turn are linearized until forces agree to 1e-7.
                 near(&name, one.contacts().forces(), other.contacts().forces(), 1e-7);
             }
-            let closed = one.contacts().closed();
-            let sliding = |&contact: &usize| one.contacts().status(contact) == ContactStatus::Sliding;
-            most[0] = most[0].max(closed.iter().filter(|closed| **closed).count());
-            most[1] = most[1].max((0..closed.len()).filter(sliding).count());
+            count(one, &mut most);
         }
         let [one, other, third] = [&with_w, &without, &iterates].map(|run| *run.statistics());
         assert!(one.contact_products == 0 && one.contact_iterations > 0, "{what}: {one:?}");
@@ -67,6 +64,14 @@ fn compare<S: System<f64> + 'static>(
         assert!(third.contact_products > 0 && third.contact_iterations == 0, "{what}: {third:?}");
     }
     most
+}
+
+/// Raises the most contacts that were closed, and that slid, to those of a state.
+fn count(state: &State<f64>, most: &mut [usize; 2]) {
+    let contacts = state.contacts();
+    let is_sliding = |&contact: &usize| contacts.status(contact) == ContactStatus::Sliding;
+    most[0] = most[0].max(contacts.closed().iter().filter(|closed| **closed).count());
+    most[1] = most[1].max((0..contacts.closed().len()).filter(is_sliding).count());
 }
 
 /// Vectors that differ by a share of the largest entry at most.
@@ -168,10 +173,7 @@ fn compare_massless(
         let name = format!("{what}, step {step}");
         near(&name, one.displacement(), other.displacement(), 1e-8);
         near(&name, one.contacts().forces(), other.contacts().forces(), 1e-6);
-        let closed = one.contacts().closed();
-        let sliding = |&contact: &usize| one.contacts().status(contact) == ContactStatus::Sliding;
-        most[0] = most[0].max(closed.iter().filter(|closed| **closed).count());
-        most[1] = most[1].max((0..closed.len()).filter(sliding).count());
+        count(one, &mut most);
     }
     let [one, other] = [&with_w, &without].map(|run| *run.statistics());
     assert!(one.contact_products == 0 && one.contact_iterations > 0, "{what}: {one:?}");

@@ -5,7 +5,7 @@ use crate::real::Real;
 use crate::rounding::rounding;
 use crate::simulation::build::program::CompiledStage;
 use crate::simulation::operator::Operator;
-use crate::simulation::operator::part::Part;
+use crate::simulation::operator::part::{Embedded, Part};
 use crate::simulation::operator::responses::Unit;
 use crate::sparse::{self, Combination};
 use crate::state::Motion;
@@ -131,8 +131,13 @@ impl<T: Real> Columns<T> {
         picked
     }
 
+    /// A factor of K_bb; contact may act on the `interface`.
+    pub(crate) fn factorized(&self, dofs: &[usize], interface: &[usize]) -> Result<Embedded<T>> {
+        Part::factorized(self.own(dofs)?, dofs, interface)
+    }
+
     /// K_bb, in the numbering of `dofs`.
-    pub(crate) fn own(&self, dofs: &[usize]) -> Result<SparseColMat<usize, T>> {
+    fn own(&self, dofs: &[usize]) -> Result<SparseColMat<usize, T>> {
         let (mut pointers, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
         for j in 0..dofs.len() {
             for (row, value) in self.column(j) {
@@ -189,7 +194,7 @@ impl<T: Real> MasslessBlock<T> {
         interface: &[usize],
     ) -> Result<Self> {
         let columns = Columns::of(system, dofs, at)?;
-        let part = Part::factorized(columns.own(dofs)?, dofs, interface)?;
+        let part = columns.factorized(dofs, interface)?;
         let massive = interface.iter().enumerate().filter(|(_, dof)| dofs.binary_search(dof).is_err());
         Ok(Self {
             dofs: dofs.to_vec(),

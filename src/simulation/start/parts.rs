@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::linear_solver::components;
 use crate::ranks::Together;
 use crate::real::Real;
-use crate::simulation::operator::part::{Embedded, Part};
+use crate::simulation::operator::part::Embedded;
 use crate::simulation::stage::massless::{Columns, damping_forces};
 use crate::system::System;
 use faer::sparse::SymbolicSparseColMat;
@@ -80,12 +80,9 @@ pub(super) fn factorize<T: Real>(
     parts: &mut Vec<Vec<usize>>,
     interface: &[usize],
 ) -> Result<Embedded<T>> {
-    let factorized = |columns: &Columns<T>, dofs: &[usize], interface: &[usize]| {
-        Part::factorized(columns.own(dofs)?, dofs, interface)
-    };
-    factorized(columns, dofs, interface).inspect_err(|_| {
+    columns.factorized(dofs, interface).inspect_err(|_| {
         let count = parts.len();
-        let factor = |part: &Vec<usize>| factorized(&columns.of_part(dofs, part), part, &[]);
+        let factor = |part: &Vec<usize>| columns.of_part(dofs, part).factorized(part, &[]);
         parts.retain(|part| count > 1 && factor(part).is_ok());
         if parts.len() == count {
             // By rounding, each part is definite and all parts together are not.
