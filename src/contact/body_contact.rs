@@ -191,17 +191,19 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
         let of = |body: usize| facets[body].iter().copied();
         let mut constraints: Vec<Box<dyn ContactConstraint<T>>> = Vec::new();
         let given = || settings.clone();
+        let has_edges = D == 3 && sharp.iter().all(|nodes| !nodes.is_empty());
         if is_of_itself {
-            constraints.push(Box::new(NodeToFacet::of_itself(&coordinates, &dofs, of(0))?.with(given())?));
+            let nodes = NodeToFacet::of_itself(&coordinates, &dofs, of(0))?.leaves_edges(has_edges);
+            constraints.push(Box::new(nodes.with(given())?));
         } else {
             let faces = Mortar::without_corner_check(&coordinates, &dofs, of(0), of(1))?;
             constraints.push(Box::new(faces.with(given())?));
             for (body, nodes) in sharp.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
                 let corners = NodeToFacet::one_pass(&coordinates, &dofs, nodes, of(1 - body))?.facing(of(body))?;
-                constraints.push(Box::new(corners.with(given())?));
+                constraints.push(Box::new(corners.leaves_edges(has_edges).with(given())?));
             }
         }
-        if D == 3 && sharp.iter().all(|nodes| !nodes.is_empty()) {
+        if has_edges {
             let places: Vec<[T; 3]> = coordinates.iter().map(|x| std::array::from_fn(|i| x[i])).collect();
             let dofs: Vec<[usize; 3]> = dofs.iter().map(|dofs| std::array::from_fn(|i| dofs[i])).collect();
             let edges = match is_of_itself {

@@ -139,6 +139,8 @@ pub struct NodeToFacet<T: Real> {
     passes: Vec<Pass>,
     settings: SurfaceSettings<T>,
     vicinity: Vicinity,
+    /// Whether other constraints hold what is beside the edges.
+    leaves_edges: bool,
     rebuilds: usize,
     /// The cones of the normals of both surfaces at the last search.
     cones: [Cones; 2],
@@ -254,6 +256,7 @@ impl<T: Real> NodeToFacet<T> {
             own_surface,
             passes: vec![Pass::new(nodes)],
             settings,
+            leaves_edges: false,
             rebuilds: 0,
             cones: [Cones::default(), Cones::default()],
             rows: Rows::with_capacity(0, 0),
@@ -308,6 +311,11 @@ impl<T: Real> NodeToFacet<T> {
         let mut contact = Self::between(mesh, surface.nodes().to_vec(), surface.clone(), Some(surface))?;
         contact.prepare()?;
         Ok(contact)
+    }
+
+    /// Sets whether other constraints hold what is beside the edges.
+    pub(super) fn leaves_edges(self, leaves_edges: bool) -> Self {
+        Self { leaves_edges, ..self }
     }
 
     /// Sets the facets of the nodes' own surface. Then a node is in contact only with facets that face it: the angle

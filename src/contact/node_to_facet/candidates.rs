@@ -47,7 +47,7 @@ impl<T: Real> NodeToFacet<T> {
         &SearchState { t, u, v, ahead }: &SearchState<'_, T>,
         clearance: &mut [f64],
     ) {
-        let Self { surface, own_surface, nodes, passes, vicinity, found, cones, .. } = self;
+        let Self { surface, own_surface, nodes, passes, vicinity, found, cones, leaves_edges, .. } = self;
         let Vicinity { own_facets, reach, thickness, .. } = &*vicinity;
         let places = (&nodes.positions[..], thickness.at(t));
         let positions = places.0;
@@ -75,6 +75,7 @@ impl<T: Real> NodeToFacet<T> {
             let way = way_of(pass, node);
             let (distance, stand) = ground.clearance(place, reach.least() + way);
             *clearance = distance;
+            let stand = stand.filter(|stand| !(*leaves_edges && ground.is_beside(stand)));
             let Some(stand) = stand.map(|stand| ground.first_side(stand, way)) else { continue };
             let face_each_other = ground.vertex(&stand).zip(back).is_some_and(|(vertex, (pass, back))| {
                 let way = way_of(pass, vertex);

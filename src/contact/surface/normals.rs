@@ -4,6 +4,10 @@ use super::Surface;
 use super::shape::{Foot, Location, Point, Shape, add_scaled, dot, sub, unit};
 use crate::rounding::ROUNDED_SHARE;
 
+/// Least height of a point in front of a facet at an edge, as a share of the facet, at which it is outside in any case.
+/// Nearly flush edges count as one surface.
+const FLUSH: f64 = 0.02;
+
 impl Surface {
     /// Normalized sum of the normals on both sides of a side, at its share `s`. The far one is added only if it
     /// `counts`.
@@ -77,13 +81,16 @@ impl Surface {
         found
     }
 
-    /// Whether a point at `arm` from a side or a vertex of a facet is in front of one of the facets there, while the
-    /// others lie behind that facet. Then it is outside even if it is behind the mean normal. Such points occur
-    /// because facets with nearer closest points may be excluded for the node.
-    fn is_outside(&self, facet: usize, location: Location, arm: Point, positions: &[Point]) -> bool {
-        /// Least height of the point in front of the facet, as a share of the facet. Nearly flush edges count as one
-        /// surface.
-        const FLUSH: f64 = 0.02;
+    /// Whether a point at `arm` from a side or a vertex of a facet is in front of one of the facets there, by this
+    /// share of it, while the others lie behind that facet. Then it is outside even if it is behind the mean normal.
+    /// Such points occur because facets with nearer closest points may be excluded for the node.
+    pub(super) fn is_outside(
+        &self,
+        facet: usize,
+        location: Location,
+        (arm, share): (Point, f64),
+        positions: &[Point],
+    ) -> bool {
         let (corner, neighbor) = match location {
             Location::Side(k) => (k, self.neighbors[facet][k].map(|(neighbor, _)| neighbor)),
             Location::Vertex(k) => (k, None),
@@ -101,7 +108,7 @@ impl Surface {
                 let shape = self.facets[other].shape(positions);
                 dot(normal, sub(shape.middle(), at)) <= ROUNDED_SHARE * shape.size()
             };
-            dot(normal, arm) > FLUSH * self.facets[one].shape(positions).size()
+            dot(normal, arm) > share * self.facets[one].shape(positions).size()
                 && there().all(|other| other == one || is_behind(other))
         })
     }
@@ -145,7 +152,7 @@ impl Surface {
         if touching || foot.location == Location::Inside {
             return Some((mean, dot(mean, arm)));
         }
-        let is_behind = dot(mean, arm) < 0.0 && !self.is_outside(facet, location, arm, positions);
+        let is_behind = dot(mean, arm) < 0.0 && !self.is_outside(facet, location, (arm, FLUSH), positions);
         let side = if is_behind { -1.0 } else { 1.0 };
         Some((unit(arm)?.map(|x| side * x), side * foot.distance))
     }

@@ -282,6 +282,20 @@ impl Ground<'_> {
         steeper > ROUNDED_SHARE || (steeper >= -ROUNDED_SHARE && comes_later)
     }
 
+    /// Whether a node is beside the facet of its projection: outside at an edge, and behind the facet by more than a
+    /// penetration. It cannot come in front of the facet within a step. But the direction of its gap reverses once it
+    /// is deeper behind the facet than it is away from the side face.
+    pub(crate) fn is_beside(&self, stand: &Stand) -> bool {
+        /// Depth as a share of the facet.
+        const PENETRATION: f64 = 1e-4;
+        let Stand { facet, location, ref weights, normal, distance, factor, offset, .. } = *stand;
+        let arm = normal.map(|x| distance * x);
+        let shape = self.surface.facets()[facet].shape(self.positions);
+        let gap = shape.normal(weights).map_or(0.0, |normal| dot(normal, arm) - factor * offset);
+        gap < -PENETRATION * shape.size()
+            && self.surface.is_outside(facet, location, (arm, ROUNDED_SHARE), self.positions)
+    }
+
     /// The normal of the projection of a node at p onto a facet, and the distance along it.
     fn direction(&self, place: usize, facet: usize, p: Point, projected: &(Shape, Foot)) -> Option<(Point, f64)> {
         // Computed at most once, and only if the node touches a vertex or a side.
