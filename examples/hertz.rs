@@ -4,10 +4,10 @@
 
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{
     Composite, ContactLaw, LinearRows, LinearSystem, Newmark, NodesOnObstacle, Simulation, TimeIntegrator,
 };
+use contact_dynamics_scenes::reference::PowerLawImpact;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use example_support::output::Output;
 use std::error::Error;

@@ -31,7 +31,6 @@ mod preset;
 pub mod ranks;
 mod real;
 pub mod reduction;
-pub mod reference;
 mod rounding;
 mod scalar;
 mod simulation;

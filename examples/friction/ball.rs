@@ -2,8 +2,8 @@
 
 use crate::rows::Table;
 use contact_dynamics::contact::Plane;
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{Composite, ContactLaw, NodesOnObstacle, Result, Simulation};
+use contact_dynamics_scenes::reference::PowerLawImpact;
 use contact_dynamics_scenes::solids::{Material, Solid};
 use std::f64::consts::PI;
 

@@ -10,6 +10,7 @@ use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::combinations::{Combination, Correction, plain};
 use contact_dynamics_scenes::masses::Takers;
 use contact_dynamics_scenes::measure::{Record, figures, record_run, try_record_run};
+use contact_dynamics_scenes::reference::Side;
 use contact_dynamics_scenes::sparse::block;
 use example_support::collisions::{Collision, Swept};
 
@@ -128,10 +129,9 @@ fn magic_step(extent: &Extent) -> Vec<Row> {
             let miss = pressed.iter().zip(&expected).fold(0.0_f64, |most, (p, e)| most.max((p - e).abs()));
             let force = if pressed.len() == expected.len() { miss } else { f64::INFINITY };
             let exact = scene.bars.exact(0.5);
-            let left = contact_dynamics::reference::Side::Left;
             let before = record.t.iter().zip(&record.u).filter(|(t, _)| **t < 0.3);
             let place = before.fold(0.0_f64, |most, (t, u)| {
-                most.max((u[0] - exact.displacement(left, scene.bars.length[0], *t)).abs())
+                most.max((u[0] - exact.displacement(Side::Left, scene.bars.length[0], *t)).abs())
             });
             Ok([force, place / (SPEED * 0.1)])
         };

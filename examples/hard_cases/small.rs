@@ -4,11 +4,11 @@
 use crate::Extent;
 use crate::table::Bound::{AtLeast, AtMost};
 use crate::table::{Row, each, rows};
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{ContactLaw, LinearRows, Result, Simulation};
 use contact_dynamics_scenes::combinations::{Combination, listed};
 use contact_dynamics_scenes::hyperelastic::Law;
 use contact_dynamics_scenes::large::{Swing, Throw};
+use contact_dynamics_scenes::reference::PowerLawImpact;
 use contact_dynamics_scenes::schemes::{self, Listed};
 use contact_dynamics_scenes::sparse::free;
 use contact_dynamics_scenes::springs;

@@ -1,8 +1,8 @@
 //! Two scenes with smooth motion and exact answers.
 
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::reference::single_oscillator;
 use contact_dynamics::{Control, LinearSystem, Simulation, StepView, TimeIntegrator};
+use contact_dynamics_scenes::reference::single_oscillator;
 use contact_dynamics_scenes::springs;
 use std::f64::consts::PI;
 use std::time::Instant;

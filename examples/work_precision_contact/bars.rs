@@ -2,11 +2,11 @@
 
 use crate::rows::Row;
 use crate::scene::{Errors, Model, Scene, force_errors};
-use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{Result, Simulation};
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::masses::Body;
 use contact_dynamics_scenes::measure::{impact, try_record_run};
+use contact_dynamics_scenes::reference::BouncingBar;
 use contact_dynamics_scenes::wall_bar::WallBar;
 
 /// Numbers of elements of a bar; the largest ones are within the budget at large Courant numbers only.

@@ -1,11 +1,11 @@
 //! Contact laws: compliant ones against springs and Hertz' impact, restitution against bouncing balls and cradles.
 
 use contact_dynamics::contact::{ContactLaw, GapOffset};
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{
     CdLagrange, CentralDifference, Composite, Error, GeneralizedAlpha, LinearRows, LinearSystem, MoreauJean, Newmark,
     PersistencyCorrection, Simulation, TchamwaWielgosz, TimeIntegrator,
 };
+use contact_dynamics_scenes::reference::PowerLawImpact;
 use contact_dynamics_scenes::schemes;
 use contact_dynamics_scenes::sparse::{matrix, springs};
 

@@ -2,7 +2,6 @@
 //! modes.
 
 use contact_dynamics::LinearSystem;
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{ContactLaw, Corrector, MoreauJean, Newmark, PersistencyCorrection, Simulation, System, verify};
 use contact_dynamics_scenes::damped_contact::{
     DampedContact, DampedLaw, damping_ratio, restitution_of_hertz_damp, restitution_without_pull,
@@ -10,6 +9,7 @@ use contact_dynamics_scenes::damped_contact::{
 use contact_dynamics_scenes::frames::{Frame, Frames};
 use contact_dynamics_scenes::ground::{Ground, ricker};
 use contact_dynamics_scenes::pounding::{Pounding, Record};
+use contact_dynamics_scenes::reference::PowerLawImpact;
 use contact_dynamics_scenes::sparse::{matrix, spring};
 use std::f64::consts::PI;
 use std::sync::Arc;

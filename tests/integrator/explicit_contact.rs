@@ -2,7 +2,6 @@
 //! Moreau–Jean, Noh–Bathe; and position-level contact of Chung–Lee and Hulbert–Chung.
 
 use contact_dynamics::contact::GapOffset;
-use contact_dynamics::reference::Side;
 use contact_dynamics::tableau::{ContactLevel, Stage, Tableau};
 use contact_dynamics::{
     CdLagrange, CentralDifference, ChungLee, Corrector, Error, HulbertChung, LinearRows, MoreauJean, NohBathe,
@@ -10,6 +9,7 @@ use contact_dynamics::{
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::{Figures, figures, record};
+use contact_dynamics_scenes::reference::Side;
 use contact_dynamics_scenes::schemes::Tabulated;
 use contact_dynamics_scenes::sparse::free;
 use contact_dynamics_scenes::wall_bar::WallBar;

@@ -1,9 +1,9 @@
 //! Observed order of u, v and a on smooth motion: damped forced oscillator, and several dofs at once.
 
 use contact_dynamics::analysis::order;
-use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::tableau::StartUp;
 use contact_dynamics::{LinearSystem, Simulation, TimeIntegrator};
+use contact_dynamics_scenes::reference::{HarmonicForce, forced_oscillator, single_oscillator};
 use contact_dynamics_scenes::schemes::{Listed, all};
 use contact_dynamics_scenes::sparse::{matrix, springs};
 
@@ -88,7 +88,7 @@ fn several_dofs_are_second_order_from_the_first_step() {
         let mut motion = [[0.0; 3]; 3];
         for (omega, shape) in &modes {
             let xi = 0.5 * (alpha / omega + beta * omega);
-            let q = contact_dynamics::reference::single_oscillator(*omega, xi, 1.0, 0.5, t);
+            let q = single_oscillator(*omega, xi, 1.0, 0.5, t);
             for (field, q) in q.iter().enumerate() {
                 for (i, s) in shape.iter().enumerate() {
                     motion[field][i] += s * q;

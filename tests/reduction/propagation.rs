@@ -2,9 +2,9 @@
 
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::reduction::{Boundary, ModalPropagation, ReducedBody, Reduction};
-use contact_dynamics::reference::single_oscillator;
 use contact_dynamics::{Error, LinearRows};
 use contact_dynamics_scenes::propagated::{bounces, wall};
+use contact_dynamics_scenes::reference::single_oscillator;
 use contact_dynamics_scenes::sparse::{diagonal, matrix, springs};
 use std::f64::consts::PI;
 

@@ -2,12 +2,12 @@
 //! and redundant contacts.
 
 use contact_dynamics::contact_solver::{GaussSeidel, Pivoting};
-use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{
     ActiveSet, Composite, ContactSolver, LinearRows, LinearSystem, Newmark, PersistencyCorrection, Simulation,
     TimeIntegrator,
 };
 use contact_dynamics_scenes::measure::record_run;
+use contact_dynamics_scenes::reference::BouncingBar;
 use contact_dynamics_scenes::sparse::{block, free};
 use contact_dynamics_scenes::wall_bar::WallBar;
 use contact_dynamics_scenes::{Bars, Record};

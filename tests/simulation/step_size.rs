@@ -2,13 +2,13 @@
 
 use contact_dynamics::contact::GapOffset;
 use contact_dynamics::observer::ContactRecorder;
-use contact_dynamics::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics::{
     Bathe, Bdf2, Composite, ContactLaw, Corrector, Error, GeneralizedAlpha, Houbolt, LinearRows, LinearSystem,
     MoreauJean, Newmark, Oalts, Park, PersistencyCorrection, Simulation, SimulationBuilder, StartUp, TimeIntegrator,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::measure::record_run;
+use contact_dynamics_scenes::reference::{HarmonicForce, forced_oscillator};
 use contact_dynamics_scenes::schemes::{Listed, all, correctable};
 use contact_dynamics_scenes::sparse::{matrix, springs};
 use std::sync::atomic::{AtomicBool, Ordering};

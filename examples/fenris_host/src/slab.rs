@@ -6,11 +6,11 @@ use crate::glue;
 use crate::scene::Outcome;
 use contact_dynamics::contact::Plane;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
-use contact_dynamics::reference::{Bar, CollidingBars};
 use contact_dynamics::{
     Corrector, GeneralizedAlpha, LinearSystem, Mass, Newmark, NodesOnObstacle, PersistencyCorrection, Preset,
     Simulation, TimeIntegrator, mass,
 };
+use contact_dynamics_scenes::reference::{Bar, CollidingBars};
 use contact_dynamics_scenes::solids::Material;
 use fenris::mesh::procedural::create_rectangular_uniform_quad_mesh_2d;
 use fenris::nalgebra::Vector2;

@@ -5,7 +5,7 @@ use crate::options::Options;
 use crate::output::Summary;
 use crate::refusal::{Refusal, Result};
 use clap::{Parser, ValueEnum};
-use contact_dynamics::reference::{Bar, CollidingBars};
+use contact_dynamics_bars::reference::{Bar, CollidingBars};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! The experiment itself: which integrators and corrections are compared, and what is measured of a run.
 
-use contact_dynamics::reference::{CollidingBars, Side};
 use contact_dynamics::{Composite, Newmark, PersistencyCorrection, Result, Simulation, TimeIntegrator};
 use contact_dynamics_bars::Bars;
 use contact_dynamics_bars::measure::{Figures, Record, figures, record_run};
+use contact_dynamics_bars::reference::{CollidingBars, Side};
 use std::time::Instant;
 
 /// End of every run; the bars touch from 0.1 s to 0.3 s.

@@ -2,8 +2,8 @@
 
 use crate::impacts::{Course, Impact, Part};
 use crate::masses::{Takers, Treatment};
+use crate::reference::PowerLawImpact;
 use crate::solids::{Material, Solid};
-use contact_dynamics::reference::PowerLawImpact;
 use contact_dynamics::{ContactLaw, Result};
 use std::f64::consts::PI;
 

@@ -44,7 +44,7 @@ pub mod vectors;
 pub mod wall_bar;
 pub mod well;
 
-pub use contact_dynamics_bars::{Bars, Figures, MassKind, Record, bars, masses, measure, record, sparse};
+pub use contact_dynamics_bars::{Bars, Figures, MassKind, Record, bars, masses, measure, record, reference, sparse};
 #[cfg(shared_instances)]
 #[doc(hidden)]
 pub use instances::instances;

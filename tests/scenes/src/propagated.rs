@@ -1,9 +1,9 @@
 //! The reduced bars of `reduced`, propagated exactly instead of by a scheme, from parents of any fineness.
 
 use crate::reduced::{Bounced, SPEED, Struck, errors, paper_bar, share_of_misses, summary, wall_exact};
+use crate::reference::BouncingBar;
 use crate::wall_bar::WallBar;
 use contact_dynamics::reduction::{Boundary, ModalPropagation, ReducedBody, Reduction};
-use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{LinearRows, Result};
 
 /// A bar reduced to so many modes, with its weight.

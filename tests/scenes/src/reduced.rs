@@ -2,9 +2,9 @@
 
 use crate::Bars;
 use crate::masses::{Takers, Treatment};
+use crate::reference::{Bar, BouncingBar, CollidingBars};
 use crate::wall_bar::WallBar;
 use contact_dynamics::reduction::{Blocks, Boundary, Reduction};
-use contact_dynamics::reference::{Bar, BouncingBar, CollidingBars};
 use contact_dynamics::{LinearRows, LinearSystem, PersistencyCorrection, Result, Simulation, TimeIntegrator};
 
 /// Elements of the bars that are reduced.

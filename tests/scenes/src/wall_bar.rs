@@ -1,9 +1,9 @@
 //! One elastic bar above a rigid floor, upright, under gravity.
 
 use crate::masses::{Body, MassMatrix};
+use crate::reference::BouncingBar;
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::affine_motions;
-use contact_dynamics::reference::BouncingBar;
 use contact_dynamics::{ContactLaw, LinearRows, LinearSystem, Result, Simulation};
 
 /// A bar of linear elements with lumped mass; dof 0 is its lower end.
@@ -26,11 +26,11 @@ impl WallBar {
         let bar = BouncingBar::doyen();
         Self {
             elements,
-            young: bar.young(),
-            density: bar.density(),
-            length: bar.length(),
-            gravity: bar.gravity(),
-            height: bar.drop(),
+            young: bar.young,
+            density: bar.density,
+            length: bar.length,
+            gravity: bar.gravity,
+            height: bar.drop,
             damping: 0.0,
         }
     }

@@ -1,9 +1,9 @@
 //! Two elastic bars of linear elements on a line, one behind the other, with contact between their facing ends.
 
 use crate::masses::{Body, MassMatrix};
+use crate::reference::{Bar, CollidingBars};
 use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::mass::affine_motions;
-use contact_dynamics::reference::{Bar, CollidingBars};
 use contact_dynamics::{ContactLaw, LinearRows, LinearSystem, Real};
 
 /// Lumped or consistent mass.

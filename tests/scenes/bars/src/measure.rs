@@ -1,8 +1,8 @@
 //! Runs of the two-bar scene and the figures that are taken from them.
 
 use crate::Bars;
+use crate::reference::{CollidingBars, Side};
 use contact_dynamics::observer::{Control, EnergyRecorder, StepView};
-use contact_dynamics::reference::CollidingBars;
 use contact_dynamics::{Corrector, Real, Result, Simulation, TimeIntegrator};
 use std::ops::Range;
 
@@ -168,7 +168,7 @@ pub fn figures(bars: &Bars, record: &Record, h: f64) -> Figures {
     let velocity: Vec<f64> = (0..record.t.len())
         .filter(|&i| record.t[i] >= window.0 && record.t[i] <= window.1)
         .map(|i| {
-            let exact = exact.velocity(contact_dynamics::reference::Side::Left, bars.length[0], record.t[i]);
+            let exact = exact.velocity(Side::Left, bars.length[0], record.t[i]);
             (record.v[i][0] - exact) / speed
         })
         .collect();

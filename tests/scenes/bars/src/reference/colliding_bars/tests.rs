@@ -244,20 +244,16 @@ fn common_velocity_changes_nothing_else() {
     let boost = 7.0;
     let moved = |bar: Bar| Bar { velocity: bar.velocity + boost, ..bar };
     let left = Bar { young: 49.0, ..BAR };
-    let wall = |bar, wall| CollidingBars::against_moving_wall(bar, wall, 0.01, 1.0).unwrap();
-    for (rest, moving) in
-        [(dissimilar(), pair(moved(left), moved(RESTING), 0.01)), (wall(BAR, 0.0), wall(moved(BAR), boost))]
-    {
-        for t in samples(499) {
-            close(moving.contact_force(t), rest.contact_force(t), 1e-14);
-            close(moving.gap(t), rest.gap(t), 1e-14);
-            close(moving.strain_energy(t), rest.strain_energy(t), 1e-16);
-            for side in [Side::Left, Side::Right] {
-                let [u, u0] = [&moving, &rest].map(|bars| bars.displacement(side, 4.0, t));
-                close(u, u0 + boost * t, 1e-14);
-                let [v, v0] = [&moving, &rest].map(|bars| bars.velocity(side, 4.0, t));
-                close(v, v0 + boost, 1e-14);
-            }
+    let (rest, moving) = (dissimilar(), pair(moved(left), moved(RESTING), 0.01));
+    for t in samples(499) {
+        close(moving.contact_force(t), rest.contact_force(t), 1e-14);
+        close(moving.gap(t), rest.gap(t), 1e-14);
+        close(moving.strain_energy(t), rest.strain_energy(t), 1e-16);
+        for side in [Side::Left, Side::Right] {
+            let [u, u0] = [&moving, &rest].map(|bars| bars.displacement(side, 4.0, t));
+            close(u, u0 + boost * t, 1e-14);
+            let [v, v0] = [&moving, &rest].map(|bars| bars.velocity(side, 4.0, t));
+            close(v, v0 + boost, 1e-14);
         }
     }
 }
@@ -342,5 +338,4 @@ fn queries_out_of_range_are_nan_and_parameters_are_checked() {
         let error = CollidingBars::new(left, BAR, gap, until).unwrap_err();
         assert_eq!(error.to_string(), message);
     }
-    assert!(CollidingBars::against_moving_wall(BAR, f64::INFINITY, 0.0, 1.0).is_err());
 }

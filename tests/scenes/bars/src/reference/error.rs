@@ -8,7 +8,6 @@ pub(super) const MAX_EVENTS: usize = 200_000;
 
 /// Why a reference solution cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum ReferenceError {
     /// A parameter, or a quantity computed from it, is not finite or has the wrong sign.
     InvalidParameter {

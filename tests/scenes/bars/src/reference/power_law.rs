@@ -5,17 +5,6 @@
 /// Hertz' impact of two elastic spheres has p = 3/2 and k = 4/3 E* √R, with the effective m and R of the pair (1/m =
 /// Σ 1/mᵢ). The duration is the integral of dδ/√(v² − 2k δ^{p+1}/((p+1) m)) there and back, in closed form with
 /// Euler's beta function.
-///
-/// ```
-/// use contact_dynamics::reference::PowerLawImpact;
-/// // Two glass spheres, radius 0.01, E = 48 GPa, ν = 0.2, ρ = 2800, meeting at 20 m/s.
-/// let mass = 2800.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.01_f64.powi(3) / 2.0;
-/// let stiffness = 4.0 / 3.0 * 48e9 / (2.0 * 0.96) * 0.005_f64.sqrt();
-/// let impact = PowerLawImpact { mass, stiffness, exponent: 1.5, velocity: 20.0 };
-/// assert!((impact.depth() / 2.74113e-4 - 1.0).abs() < 1e-5);
-/// assert!((impact.force() / 10696.9 - 1.0).abs() < 1e-5);
-/// assert!((impact.duration() / 4.03395e-5 - 1.0).abs() < 1e-5);
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLawImpact {
     /// m.
