@@ -9,7 +9,6 @@ mod courant;
 mod inverse;
 mod layers;
 mod lump;
-mod reciprocal;
 mod redistribute;
 mod singular;
 
@@ -20,7 +19,6 @@ pub(crate) use consistent::ConsistentInverse;
 pub use courant::courant;
 pub(crate) use inverse::InverseMass;
 pub use lump::{lump, lump_diagonal};
-pub use reciprocal::reciprocal;
 pub use redistribute::{Redistribution, affine_motions, redistribute, redistribute_consistent};
 pub use singular::{mixed, singular};
 

@@ -1,6 +1,5 @@
-//! Masses: lumped, blended, redistributed, singular and reciprocal ones.
+//! Masses: lumped, blended, redistributed and singular ones.
 
 mod blend;
 mod consistent;
-mod reciprocal;
 mod redistribution;
