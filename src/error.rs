@@ -455,10 +455,10 @@ pub enum Error {
         /// The change of its gap in the step with obstacles held, and the change along its row.
         change: [f64; 2],
     },
-    /// The contact problem of a frame between two bodies was not solved.
-    #[error("contact on the frame: {failure}; rows are nodes of the frame")]
+    /// The contact problem of the frame between bodies in separate codes was not solved.
+    #[error("contact on the frame: {failure}; rows are those of the assembly")]
     Frame {
-        /// The failure, in the numbering of the frame and the unit of its gaps.
+        /// The failure, in the numbering of the rows of the assembly and the unit of their gaps.
         failure: ContactFailure<f64>,
     },
     /// The initial state violates a contact constraint.

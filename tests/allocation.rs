@@ -6,7 +6,7 @@ use contact_dynamics::contact::{
 use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
-use contact_dynamics::partitioned::{self, Assembly, Coupling, Frame};
+use contact_dynamics::partitioned::{Assembly, Coupling};
 use contact_dynamics::reduction::{ModalPropagation, Reduction};
 use contact_dynamics::{
     ByBody, Composite, ConjugateGradients, Corrector, EnergyMomentum, GeneralizedAlpha, Gssss, LinearRows,
@@ -35,7 +35,6 @@ fn steps_do_not_allocate() {
     bodies_apart();
     iterations();
     long_steps();
-    frames();
     assemblies();
     modes_propagated();
     rotors();
@@ -424,29 +423,6 @@ fn long_steps() {
     assert_steps_allocate_nothing(&mut run, 10, 0, "long steps");
     let after = run.statistics();
     assert!(after.contact_products > before.contact_products && after.newton_iterations > before.newton_iterations);
-}
-
-/// A frame whose nodes close one by one, and are held one by one.
-fn frames() {
-    let n = 9_usize;
-    let flexibility: Vec<f64> = (0..n * n)
-        .map(|k| (if k / n == k % n { 2.0 } else { 0.0 }) + 1.0 / (1 + (k / n).abs_diff(k % n)) as f64)
-        .collect();
-    let (mut free, gaps, mut held) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
-    let mut frame = Frame::new(n).unwrap();
-    let counted = allocation_counter::measure(|| {
-        for closed in 0..=n {
-            for node in 0..n {
-                (free[node], held[node]) = (if node < closed { 1.0 } else { -2.0 }, node >= closed);
-            }
-            let first = partitioned::Side::new(&free, &flexibility);
-            let second = partitioned::Side::new(&gaps, &flexibility);
-            let found = frame.solve([first, second], &gaps).unwrap();
-            assert_eq!(found.closed().iter().filter(|closed| **closed).count(), closed);
-            frame.hold([first, second], &gaps, &held).unwrap();
-        }
-    });
-    assert_eq!(counted.count_total, 0);
 }
 
 /// Three bodies whose rows close one by one, and are held one by one, as a body softens.

@@ -1,15 +1,13 @@
 //! Any number of bodies, coupled by rows over their interface dofs.
 
 use super::coupling::Coupling;
-use super::problem::{Problem, check_flexibility, check_length};
+use super::problem::{FLEXIBILITY, Problem, check_flexibility, check_length};
 use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::sparse::check_vector;
-
-const FLEXIBILITY: &str = "flexibility of a body";
 
 /// The interface of a body: its flexibility, and its part of the rows.
 #[derive(Debug)]
@@ -26,7 +24,7 @@ impl<T: Real> Body<T> {
     /// Without rows.
     fn new(flexibility: &[T]) -> Result<Self> {
         let dofs = flexibility.len().isqrt();
-        check_flexibility(FLEXIBILITY, flexibility, dofs)?;
+        check_flexibility(flexibility, dofs)?;
         let mut own = memory::reserve(dofs, dofs, FLEXIBILITY)?;
         own.extend_from_slice(flexibility);
         Ok(Self { dofs, flexibility: own, rows: Vec::new(), starts: vec![0], entries: Vec::new() })
@@ -109,8 +107,9 @@ impl<T: Real> Assembled<T> {
 }
 
 /// Any number of bodies in separate codes, joined by rows over their interface dofs: the interface problem of
-/// localized Lagrange multipliers (Park, Felippa, Gumaste, Comput. Mech. 24, 2000), or the dual assembly of
-/// substructures (de Klerk, Rixen, Voormeeren, AIAA J. 46, 2008) with contact.
+/// localized Lagrange multipliers (Park, Felippa, Gumaste, Comput. Mech. 24, 2000; with contact Rebel, Park, Felippa,
+/// Int. J. Numer. Methods Eng. 54, 2002), or the dual assembly of substructures (de Klerk, Rixen, Voormeeren, AIAA J.
+/// 46, 2008) with contact.
 ///
 /// Body s has the values d_s = free_s + F_s p_s under forces p_s on its interface dofs, and the rows G_s. With one
 /// multiplier per row,
@@ -126,10 +125,18 @@ impl<T: Real> Assembled<T> {
 /// between two bodies are equivalent: rows may be dependent.
 ///
 /// A body needs no knowledge of the others or their codes: its step continues with the [`forces`](Assembled::forces).
-/// The loop of a host is the same as for a [`Frame`](super::Frame): each body advances without contact, then
-/// [`solve`](Self::solve) is called, then each body adds the response to its forces. [`hold`](Self::hold) of a second
-/// assembly, with the flexibilities of M⁻¹, makes rates agree. Bodies advance and respond independently, in parallel
-/// if there are threads.
+/// Results equal the monolithic form up to rounding (`tests/partitioned/assemblies.rs`). An explicit or implicit step
+/// of the host:
+///
+/// 1. each body advances without contact, `free`, and solves for unit forces on its interface (once while its matrix
+///    is unchanged);
+/// 2. [`solve`](Self::solve);
+/// 3. each body adds the response to its forces;
+/// 4. to make velocities (then accelerations) agree with the contact, as
+///    [`PersistencyCorrection`](crate::PersistencyCorrection) does: [`hold`](Self::hold) on the closed rows that are
+///    pressed or approach, of a second assembly with the flexibilities of M⁻¹.
+///
+/// Bodies advance and respond independently, in parallel if there are threads.
 ///
 /// W is dense: R² numbers for R rows. The flexibility of a body with n interface dofs needs n solves once, and n²
 /// numbers. This suits some thousand rows.
@@ -250,19 +257,22 @@ impl<T: Real> Assembly<T> {
         self.equalities.len()
     }
 
-    /// Replaces the flexibility of a body whose matrix has changed.
+    /// Replaces the flexibility of a body whose matrix has changed; W is kept if it is the same.
     ///
     /// # Errors
     ///
     /// The errors of [`new`](Self::new), also for a body that does not exist; the assembly is then unchanged.
     pub fn set_flexibility(&mut self, number: usize, flexibility: &[T]) -> Result<()> {
         let count = self.bodies.len();
-        let Some(body) = self.bodies.get(number) else {
+        let Some(body) = self.bodies.get_mut(number) else {
             let part = format!("a flexibility of body {number} of {count}");
             return Err(Error::Incompatible { part, reason: "bodies are counted from zero" });
         };
-        check_flexibility(FLEXIBILITY, flexibility, body.dofs)?;
-        self.update_flexibility(number, flexibility);
+        check_flexibility(flexibility, body.dofs)?;
+        if body.flexibility != flexibility {
+            body.flexibility.copy_from_slice(flexibility);
+            self.formed = false;
+        }
         Ok(())
     }
 
@@ -293,17 +303,8 @@ impl<T: Real> Assembly<T> {
         self.run(free, gaps, Some(held))
     }
 
-    /// Replaces a checked flexibility; W is kept if it is the same.
-    pub(super) fn update_flexibility(&mut self, body: usize, flexibility: &[T]) {
-        let own = &mut self.bodies[body].flexibility;
-        if own != flexibility {
-            own.copy_from_slice(flexibility);
-            self.formed = false;
-        }
-    }
-
     /// [`solve`](Self::solve), or [`hold`](Self::hold) for some rows.
-    pub(super) fn run(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) -> Result<&Assembled<T>> {
+    fn run(&mut self, free: &[&[T]], gaps: &[T], held: Option<&[bool]>) -> Result<&Assembled<T>> {
         let rows = self.rows();
         check_vector("gaps of an assembly", gaps, rows)?;
         check_length("the list of rows held", held.map_or(rows, <[bool]>::len), rows)?;

@@ -50,7 +50,7 @@ impl<T: Real> Problem<T> {
     }
 }
 
-/// The failure in the numbering of the frame.
+/// The failure in the numbering of all rows.
 fn of_frame<T: Real>(failure: ContactFailure<T>, rows: &[usize]) -> ContactFailure<f64> {
     match failure {
         ContactFailure::Contradictory { row, other, residual } => {
@@ -70,18 +70,20 @@ fn of_frame<T: Real>(failure: ContactFailure<T>, rows: &[usize]) -> ContactFailu
     }
 }
 
+pub(super) const FLEXIBILITY: &str = "flexibility of a body";
+
 pub(super) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
     if found == expected { Ok(()) } else { Err(Error::Dimension { what, expected, found }) }
 }
 
 /// Rejects flexibilities whose number of dofs is not n, with a negative diagonal entry, or that are not symmetric
 /// (columns may have been stored as rows, or solved for with other normals).
-pub(super) fn check_flexibility<T: Real>(what: &'static str, flexibility: &[T], n: usize) -> Result<()> {
-    check_vector(what, flexibility, n * n)?;
+pub(super) fn check_flexibility<T: Real>(flexibility: &[T], n: usize) -> Result<()> {
+    check_vector(FLEXIBILITY, flexibility, n * n)?;
     let entry = |i: usize, j: usize| flexibility[i + j * n];
     for column in 0..n {
         if entry(column, column) < T::zero() {
-            return Err(Error::Singular { matrix: what, dof: column });
+            return Err(Error::Singular { matrix: FLEXIBILITY, dof: column });
         }
         for row in 0..column {
             // Columns are results of solves, whose error depends on the condition of the body's matrix.

@@ -6,7 +6,7 @@ use contact_dynamics::corrector::{
     ContactImplicit, ContactStabilized, LaursenLove, NonsmoothSplitting, Release, TaylorPapadopoulos, ZeroAcceleration,
 };
 use contact_dynamics::observer::{ContactRecorder, DofRecorder, EnergyRecorder};
-use contact_dynamics::partitioned::{Assembled, Assembly, Coupling, Frame, Interface, Side};
+use contact_dynamics::partitioned::{Assembled, Assembly, Coupling};
 use contact_dynamics::tableau::{Momentum, Row, Rows, Stage, Tableau};
 use contact_dynamics::{
     ActiveSet, Automatic, Bathe, Bdf2, ByBody, CdLagrange, CentralDifference, Cholesky, ChungLee, Composite,
@@ -57,7 +57,7 @@ fn parts_of_the_crate_are_moved_and_shared() {
     shared::<(TaylorPapadopoulos, ZeroAcceleration, NonsmoothSplitting)>();
     shared::<(Automatic, Cholesky, Diagonal, Tridiagonal, Lu, ConjugateGradients)>();
     shared::<(ActiveSet<f64>, Pivoting<f64>, GaussSeidel)>();
-    shared::<(Interface<f64>, Side<'static, f64>, Assembled<f64>, Coupling<f64>)>();
+    shared::<(Assembled<f64>, Coupling<f64>)>();
 }
 
 /// These hold parts of the host, which are `Send` and need not be `Sync`.
@@ -66,5 +66,5 @@ fn runs_are_moved() {
     moved::<Simulation<'static, f64>>();
     moved::<SimulationBuilder<'static, f64>>();
     moved::<LinearSystem<'static, f64>>();
-    moved::<(JumpProjection<f64>, Frame<f64>, Assembly<f64>, ByBody<'static, f64>)>();
+    moved::<(JumpProjection<f64>, Assembly<f64>, ByBody<'static, f64>)>();
 }
