@@ -5,8 +5,8 @@ use contact_dynamics::faer::sparse::{SparseColMat, Triplet};
 use contact_dynamics::tableau::{StartUp, Tableau};
 use contact_dynamics::{
     CdLagrange, Checkpoint, Composite, ContactState, Energy, Error, GeneralizedAlpha, Houbolt, InitialOverclosure,
-    LinearRows, LinearSystem, Newmark, Newton, NodesOnObstacle, Outcome, PersistencyCorrection, Real, Result,
-    Simulation, SimulationBuilder, Statistics, StepControl, System, TimeIntegrator, Works,
+    LinearRows, LinearSystem, Newmark, NodesOnObstacle, Outcome, PersistencyCorrection, Real, Result, Simulation,
+    SimulationBuilder, Statistics, StepControl, System, TimeIntegrator, Works,
 };
 use contact_dynamics_scenes::Bars;
 use contact_dynamics_scenes::hosts::Hooked;
@@ -176,8 +176,6 @@ fn runs_whose_step_has_changed_go_on_bit_for_bit() {
 #[test]
 fn controlled_runs_of_every_scheme_go_on_bit_for_bit() {
     let control = StepControl::halving(H / 64.0).unwrap().contact_changes(1).unwrap();
-    // Text first: a host saves its settings beside the run.
-    let control: StepControl = serde_json::from_str(&serde_json::to_string(&control).unwrap()).unwrap();
     for scheme in schemes() {
         let builder = |last: f64| {
             let bars = Bars::paper(10).delayed(0.4, H);
@@ -615,34 +613,16 @@ fn a_file_can_be_read_without_a_run() {
 }
 
 #[test]
-fn settings_and_results_are_plain_data() {
+fn results_are_plain_data() {
     fn again<D: serde::Serialize + serde::de::DeserializeOwned>(data: &D) -> [D; 2] {
         let text = serde_json::to_string(data).unwrap();
         [serde_json::from_str(&text).unwrap(), postcard::from_bytes(&postcard::to_stdvec(data).unwrap()).unwrap()]
-    }
-    let control = StepControl::halving(1e-4).unwrap();
-    for control in [control, control.local_error(1e-3).unwrap(), control.contact_changes(3).unwrap()] {
-        assert_eq!(again(&control), [control; 2]);
-    }
-    let newton = Newton::modified().line_search().tolerances(1e-7, 1e-6).unwrap().iterations(7).unwrap();
-    for newton in [newton, Newton::full()] {
-        assert_eq!(again(&newton), [newton; 2]);
     }
     for overclosure in [InitialOverclosure::Refused, InitialOverclosure::RemovedOver(0.1)] {
         assert_eq!(again(&overclosure), [overclosure; 2]);
     }
     assert_eq!(again(&StartUp::Taylor), [StartUp::Taylor; 2]);
     assert_eq!(again(&Outcome::Stopped), [Outcome::Stopped; 2]);
-    // What files say goes through the methods that check it.
-    for text in
-        [r#"{"smallest":0.0}"#, r#"{"smallest":1.0,"local_error":-1.0}"#, r#"{"smallest":1,"contact_changes":0}"#]
-    {
-        assert!(serde_json::from_str::<StepControl>(text).unwrap_err().to_string().contains("must be"));
-    }
-    assert_eq!(serde_json::from_str::<StepControl>(r#"{"smallest":1e-4}"#).unwrap(), control);
-    let text = serde_json::to_string(&newton).unwrap().replace(":7", ":0");
-    assert!(serde_json::from_str::<Newton>(&text).unwrap_err().to_string().contains("iterations"));
-
     let mut run = small(Houbolt).energy_balance().build().unwrap();
     run.run_until(0.3, &mut ()).unwrap();
     let (energy, statistics): (Energy<f64>, Statistics) = (run.energy(), *run.statistics());

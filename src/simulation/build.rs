@@ -1,6 +1,6 @@
 //! The assembly of a run: its parts are checked against one another, and the scheme is compiled.
 //!
-//! - `builder`: checks every input; `settings`: settings as stored in files.
+//! - `builder`: checks every input.
 //! - `pairing`, `law_support`: which schemes, corrections, contact laws and contact solvers are compatible.
 //! - `scheme`, `derived`: the scheme and the numbers derived from its rows.
 //! - `program`: the scheme compiled for one system and one step size.
@@ -12,6 +12,4 @@ pub(super) mod law_support;
 pub(super) mod pairing;
 pub(super) mod program;
 pub(super) mod scheme;
-#[cfg(feature = "serde")]
-pub(super) mod settings;
 pub(super) mod workspace;
