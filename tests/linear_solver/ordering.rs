@@ -144,6 +144,18 @@ fn chains_and_stars_fill_as_little_as_they_can() {
     assert!(estimate(Ordering::NestedDissection, &chain, &[]) < 3 * n);
 }
 
+/// A strip of one row of elements, no string of dofs: minimum degree works from both ends, and would fill 1.6 times as
+/// much where all dofs of an end may touch.
+#[test]
+fn contact_at_the_end_of_a_strip_costs_no_fill() {
+    let strip = Solid::rectangle([200.0, 1.0], [200, 1], MATERIAL);
+    let is_at_end = |dof: &usize| strip.nodes[dof / 2][0] > 199.5;
+    let end: Vec<usize> = (0..strip.dofs()).filter(is_at_end).collect();
+    let a = of_solid(&strip);
+    assert_eq!(end.len(), 4);
+    assert_eq!(estimate(Ordering::Automatic, &a, &end), estimate(Ordering::Automatic, &a, &[]));
+}
+
 #[test]
 fn solutions_do_not_depend_on_the_order() {
     let solid = Solid::block([1.0, 2.0, 1.0], [3, 6, 3], MATERIAL);
