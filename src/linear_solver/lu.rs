@@ -6,9 +6,9 @@ use crate::memory;
 use crate::real::Real;
 use crate::rounding::rounding;
 use crate::sparse::{self, scattered_signed};
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::dyn_stack::MemBuffer;
+use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
-use faer::sparse::linalg::{LuError, qr};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// Sparse LU factorization with partial pivoting, for any regular matrix: unsymmetric tangents (follower loads,
@@ -24,10 +24,10 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 ///
 /// **Cost.** Two factors and a less favorable order: in three dimensions several times the time and memory of
 /// [`Cholesky`](super::Cholesky). It offers no [`Condensation`](super::Condensation), so a step in contact needs a
-/// full solve for each pressed contact, and one more. [`stored_values`](Factorization::stored_values) is an upper
-/// bound for any choice of pivots; the factor may be much smaller. Refactorization does not allocate for long thin
-/// structures, which faer processes column by column; for plates and solids it works in blocks and allocates some
-/// memory each time.
+/// full solve for each pressed contact, and one more. The size of the factors depends on the pivots:
+/// [`stored_values`](Factorization::stored_values) counts the entries of the matrix alone, the factors have more.
+/// Refactorization does not allocate for long thin structures, which faer processes column by column; for plates and
+/// solids it works in blocks and allocates some memory each time.
 ///
 /// An **indefinite** matrix is factorized without an error. [`Cholesky`](super::Cholesky) rejects it, which tells
 /// Newton's method that a step is too long for a negative stiffness; with this solver that information is missing.
@@ -73,8 +73,6 @@ struct Factor<T: Real> {
     memory: MemBuffer,
     /// Number of right-hand sides for which `memory` suffices.
     room: usize,
-    /// Upper bound of the number of scalars in L and U.
-    bound: usize,
     /// Vectors for estimating the condition number.
     probe: Vec<T>,
 }
@@ -97,7 +95,6 @@ impl<T: Real> LinearSolver<T> for Lu {
         let n = check_analysis(pattern, last)?;
         let no_memory = |_| Error::OutOfMemory { what: "the analysis of a sparse LU", bytes: None };
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default()).map_err(no_memory)?;
-        let bound = bound(pattern, &symbolic)?;
         let memory = MemBuffer::try_new(T::lu_scratch(&symbolic, 1))
             .map_err(|_| Error::OutOfMemory { what: "sparse LU scratch", bytes: None })?;
         let zero = |columns| memory::zeros(n, columns, "a sparse LU");
@@ -111,40 +108,9 @@ impl<T: Real> LinearSolver<T> for Lu {
             columns: zero(1)?,
             memory,
             room: 1,
-            bound,
             probe: zero(1)?,
         }))
     }
-}
-
-/// Upper bound of the number of entries of L and U for this order of columns and any pivots: U fits into the
-/// triangular factor of AᵀA, L into the Householder vectors of QR (George and Ng, SIAM J. Sci. Stat. Comput. 8,
-/// 1987).
-fn bound(pattern: SymbolicSparseColMatRef<'_, usize>, symbolic: &SymbolicLu<usize>) -> Result<usize> {
-    let n = pattern.ncols();
-    let no_memory = || Error::OutOfMemory { what: "the analysis of a sparse LU", bytes: None };
-    let transposed = pattern.transpose().to_col_major().map_err(|_| no_memory())?;
-    let scratch = qr::col_etree_scratch::<usize>(n, n)
-        .or(qr::postorder_scratch::<usize>(n))
-        .or(qr::column_counts_aat_scratch::<usize>(n, n));
-    let mut memory = MemBuffer::try_new(scratch).map_err(|_| no_memory())?;
-    let stack = MemStack::new(&mut memory);
-    let order = Some(symbolic.col_perm());
-    let [mut parents, mut post, mut counts, mut first] = [(); 4].map(|()| vec![0; n]);
-    let tree = qr::col_etree(pattern, order, &mut parents, stack);
-    qr::postorder(&mut post, tree, stack);
-    qr::column_counts_ata(&mut counts, &mut first, transposed.as_ref(), order, tree, &post, stack);
-    // Row i joins at its first column; each column passes all rows except the pivot row on to the parent.
-    let mut heights = vec![0_usize; n];
-    for &column in first.iter().filter(|&&column| column < n) {
-        heights[column] += 1;
-    }
-    for (column, &parent) in tree.into_inner().iter().enumerate() {
-        if let Ok(parent) = usize::try_from(parent) {
-            heights[parent] += heights[column].saturating_sub(1);
-        }
-    }
-    Ok(heights.iter().sum::<usize>() + counts.iter().sum::<usize>())
 }
 
 /// Largest number of scaling passes; each halves the logarithms of the row and column scales.
@@ -306,6 +272,6 @@ impl<T: Real> Factorization<T> for Factor<T> {
     }
 
     fn stored_values(&self) -> usize {
-        self.bound
+        self.scaled.len()
     }
 }

@@ -136,7 +136,7 @@ impl<T: Real> Simulation<'_, T> {
         self.adjustment
     }
 
-    /// Number of scalars in the factors of the effective matrices.
+    /// Number of scalars in the factors of the effective matrices, as the linear solver counts them.
     pub fn factor_size(&self) -> usize {
         self.compiled.program.operators.iter().map(Operator::stored_values).sum()
     }
