@@ -13,8 +13,6 @@ pub(super) struct Cone<T> {
     pub(super) friction: T,
     /// 1 or 2.
     pub(super) tangents: usize,
-    /// Whether y_n = 0 for any p; friction then acts only if p is positive.
-    pub(super) is_bilateral: bool,
     /// Rounding of the tangential offset.
     pub(super) noise: T,
     /// The present friction; if the contact keeps sliding, the solution is near.
@@ -32,14 +30,9 @@ impl<T: Real> Cone<T> {
     /// eliminated, y_t = −γ f is (S + γ) f = −c, and |f(γ)| − μ p(γ) is positive at γ = 0 and negative for large γ,
     /// so it has a root.
     pub(super) fn solve(&self) -> [T; 3] {
-        let Self { delassus: w, offset: b, friction, tangents, is_bilateral, noise, guess } = *self;
-        let none = [T::zero(); 3];
-        if w[0][0] <= T::zero() {
-            return none;
-        }
-        if b[0] >= T::zero() {
-            let pulled = if is_bilateral { -b[0] / w[0][0] } else { T::zero() };
-            return [pulled, T::zero(), T::zero()];
+        let Self { delassus: w, offset: b, friction, tangents, noise, guess } = *self;
+        if w[0][0] <= T::zero() || b[0] >= T::zero() {
+            return [T::zero(); 3];
         }
         let normal = |f: [T; 2]| -(b[0] + w[0][1] * f[0] + w[0][2] * f[1]) / w[0][0];
         if friction <= T::zero() {

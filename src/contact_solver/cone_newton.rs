@@ -276,16 +276,12 @@ fn status<T: Real>(
     if set == AdmissibleSet::Free {
         return if own > T::zero() { Status::Held } else { Status::Open };
     }
-    if own * multipliers[first] <= y[first] && !set.is_bilateral() {
+    if own * multipliers[first] <= y[first] {
         return Status::Open;
     }
     let Some(friction) = set.friction() else { return Status::Held };
     let tangents = first + 1..first + set.rows();
     let compliance = tangents.clone().map(|row| problem.delassus(row, row)).fold(T::zero(), T::max);
-    if multipliers[first] <= T::zero() && set.is_bilateral() {
-        // A pulling bilateral contact has no friction.
-        return Status::Slides { direction: [T::zero(); 2], share: T::zero(), compliance };
-    }
     let mut augmented = [T::zero(); 2];
     for (augmented, row) in augmented.iter_mut().zip(tangents) {
         *augmented = compliance * multipliers[row] - y[row];

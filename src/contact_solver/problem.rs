@@ -29,17 +29,6 @@ pub enum AdmissibleSet {
         /// μ, from 0.
         friction: f64,
     },
-    /// A contact in a plane that does not open: y_n = 0, with p of either sign. |f| ≤ μ max(0, p), and the slip is
-    /// zero or opposes f, as in [`Cone2`](Self::Cone2). Corrections of closed contacts use it.
-    Held2 {
-        /// μ, from 0.
-        friction: f64,
-    },
-    /// The same in space, like [`Cone3`](Self::Cone3).
-    Held3 {
-        /// μ, from 0.
-        friction: f64,
-    },
 }
 
 impl AdmissibleSet {
@@ -50,8 +39,8 @@ impl AdmissibleSet {
     pub fn rows(self) -> usize {
         match self {
             Self::NonNegative | Self::Free => 1,
-            Self::Cone2 { .. } | Self::Held2 { .. } => 2,
-            Self::Cone3 { .. } | Self::Held3 { .. } => 3,
+            Self::Cone2 { .. } => 2,
+            Self::Cone3 { .. } => 3,
         }
     }
 
@@ -59,25 +48,20 @@ impl AdmissibleSet {
     pub fn friction(self) -> Option<f64> {
         match self {
             Self::NonNegative | Self::Free => None,
-            Self::Cone2 { friction }
-            | Self::Cone3 { friction }
-            | Self::Held2 { friction }
-            | Self::Held3 { friction } => Some(friction),
+            Self::Cone2 { friction } | Self::Cone3 { friction } => Some(friction),
         }
     }
 
-    /// Whether the only or the normal row of a block has y = 0 and a multiplier of either sign.
+    /// Whether y = 0, with a multiplier of either sign.
     pub(crate) fn is_bilateral(self) -> bool {
-        matches!(self, Self::Free | Self::Held2 { .. } | Self::Held3 { .. })
+        self == Self::Free
     }
 
-    /// The set of a contact with friction in 1 or 2 tangential directions; bilateral if the contact does not open.
-    pub(crate) fn with_friction(friction: f64, tangents: usize, is_bilateral: bool) -> Self {
-        match (tangents, is_bilateral) {
-            (0 | 1, false) => Self::Cone2 { friction },
-            (0 | 1, true) => Self::Held2 { friction },
-            (_, false) => Self::Cone3 { friction },
-            (_, true) => Self::Held3 { friction },
+    /// The set of a contact with friction in 1 or 2 tangential directions.
+    pub(crate) fn with_friction(friction: f64, tangents: usize) -> Self {
+        match tangents {
+            0 | 1 => Self::Cone2 { friction },
+            _ => Self::Cone3 { friction },
         }
     }
 
@@ -106,11 +90,9 @@ impl AdmissibleSet {
         if size <= friction * *normal {
             return;
         }
-        if !self.is_bilateral() {
-            let inside = (*normal + friction * size) / (T::one() + friction * friction);
-            *normal = inside.max(T::zero());
-        }
-        let share = if size > T::zero() { friction * normal.max(T::zero()) / size } else { T::zero() };
+        let inside = (*normal + friction * size) / (T::one() + friction * friction);
+        *normal = inside.max(T::zero());
+        let share = if size > T::zero() { friction * *normal / size } else { T::zero() };
         for f in tangential {
             *f *= share;
         }
@@ -127,13 +109,12 @@ impl AdmissibleSet {
     /// Residual of a block (unit of y): |min(y, W_ii λ)|, or |y| of a free row; NaN if y is not finite. `compliance`
     /// is the diagonal of W.
     ///
-    /// For a cone, the larger one of |min(y_n, W_nn p)| (|y_n| if bilateral) and |W_t f − P(W_t f − y_t)|, with P the
-    /// projection onto the disc of radius W_t μ max(0, p) and W_t the largest diagonal entry of the tangential rows
-    /// (Alart and Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991).
+    /// For a cone, the larger one of |min(y_n, W_nn p)| and |W_t f − P(W_t f − y_t)|, with P the projection onto the
+    /// disc of radius W_t μ max(0, p) and W_t the largest diagonal entry of the tangential rows (Alart and Curnier,
+    /// Comput. Methods Appl. Mech. Eng. 92, 1991).
     pub fn residual<T: Real>(self, y: &[T], multipliers: &[T], compliance: &[T]) -> T {
         if let Some(friction) = self.friction() {
-            let [normal, tangential] =
-                cone_residuals((T::of(friction), self.is_bilateral()), y, multipliers, compliance);
+            let [normal, tangential] = cone_residuals(T::of(friction), y, multipliers, compliance);
             return normal.max(tangential);
         }
         let rows = y.iter().zip(multipliers).zip(compliance);
@@ -148,12 +129,7 @@ impl AdmissibleSet {
 }
 
 /// [`AdmissibleSet::residual`] of a cone, split into normal and tangential rows.
-fn cone_residuals<T: Real>(
-    (friction, is_bilateral): (T, bool),
-    y: &[T],
-    multipliers: &[T],
-    compliance: &[T],
-) -> [T; 2] {
+fn cone_residuals<T: Real>(friction: T, y: &[T], multipliers: &[T], compliance: &[T]) -> [T; 2] {
     if y.iter().chain(multipliers).any(|x| !x.is_finite()) {
         return [T::nan(); 2];
     }
@@ -168,8 +144,7 @@ fn cone_residuals<T: Real>(
     for (k, miss) in miss.iter_mut().enumerate().take(y.len() - 1) {
         *miss = tangential * multipliers[k + 1] - share * augmented[k];
     }
-    let normal = if is_bilateral { y[0] } else { y[0].min(compliance[0] * multipliers[0]) };
-    [normal.abs(), norm(&miss)]
+    [y[0].min(compliance[0] * multipliers[0]).abs(), norm(&miss)]
 }
 
 /// The length of a tangential vector.
@@ -297,7 +272,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
             }
         }
         let guess = [T::zero(); 2];
-        Cone { delassus, offset, friction, tangents: size - 1, is_bilateral: set.is_bilateral(), noise, guess }
+        Cone { delassus, offset, friction, tangents: size - 1, noise, guess }
     }
 
     /// Number of rows.
@@ -344,7 +319,7 @@ impl<'a, T: Real> ContactProblem<'a, T> {
         }
         let (y, multipliers, compliance) = (&y[..rows.len()], &multipliers[rows.clone()], &compliance[..rows.len()]);
         match set.friction() {
-            Some(friction) => cone_residuals((T::of(friction), set.is_bilateral()), y, multipliers, compliance),
+            Some(friction) => cone_residuals(T::of(friction), y, multipliers, compliance),
             None => [set.residual(y, multipliers, compliance), T::zero()],
         }
     }

@@ -96,6 +96,8 @@ pub(crate) struct RowData<'a, T> {
     pub(crate) sets: &'a [AdmissibleSet],
     /// For each block its friction per unit normal force, if that is given. Empty if none is.
     pub(crate) along: &'a [Option<[T; 2]>],
+    /// Whether blocks whose friction is given stay closed, by a normal force of either sign.
+    pub(crate) holds: bool,
 }
 
 /// The cost and the result of an iteration.

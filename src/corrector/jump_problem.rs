@@ -18,6 +18,7 @@ pub(crate) struct Block<T> {
     pub(crate) row: usize,
     /// Number of its tangential rows, which follow the row of the gap.
     pub(crate) tangents: usize,
+    /// `Free` with tangential rows: held, with a given direction.
     pub(crate) set: AdmissibleSet,
     /// Friction per unit normal multiplier if its direction is given, that is, if the contact slides.
     pub(crate) direction: Option<[T; 2]>,

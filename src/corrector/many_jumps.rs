@@ -64,7 +64,7 @@ impl<T: Real> JumpProblem<T> {
         let mut many = self.many.take().unwrap_or_default();
         many.moved.read((g, inverse), positions.iter().map(|&position| self.rows[position]))?;
         loop {
-            if !many.solve(self, positions)? {
+            if !many.solve(self, positions, friction)? {
                 self.many = Some(many);
                 return Ok(false);
             }
@@ -149,7 +149,7 @@ impl<T: Real> Body<T> for LumpedMass<'_, T> {
 
 impl<T: Real> ManyJumps<T> {
     /// Solves for the rows at these positions. Returns whether all values are finite, and the iteration converges.
-    fn solve(&mut self, all: &JumpProblem<T>, positions: &[usize]) -> Result<bool> {
+    fn solve(&mut self, all: &JumpProblem<T>, positions: &[usize], friction: FrictionOf) -> Result<bool> {
         let Self { cg, moved, rows, compliance, offset, tolerance, sets, along, multipliers } = self;
         let size = positions.len();
         for values in [&mut *compliance, offset, tolerance, multipliers] {
@@ -171,14 +171,19 @@ impl<T: Real> ManyJumps<T> {
             tolerance[row] = all.tolerance[position] + noise;
             if block.place == position {
                 compliance[row] = block.compliance;
-                sets.push(block.set);
+                sets.push(match (block.set, block.tangents) {
+                    // Held, with given friction: the set only counts the rows.
+                    (AdmissibleSet::Free, 1..) => AdmissibleSet::with_friction(0.0, block.tangents),
+                    (set, _) => set,
+                });
                 along.push(block.direction);
             }
         }
         if !T::all_finite(offset) || !T::all_finite(compliance) {
             return Ok(false);
         }
-        let data = RowData { g: &moved.g, rows, compliance, offset, tolerance, sets, along };
+        let holds = friction == FrictionOf::Changes;
+        let data = RowData { g: &moved.g, rows, compliance, offset, tolerance, sets, along, holds };
         let patience = Patience { products: 2 * LOOKS, looks: LOOKS, residual: projected_residual::<T>().value() };
         cg.begin();
         let mut mass = LumpedMass(&moved.inverse);

@@ -77,17 +77,6 @@ fn multipliers_go_to_the_nearest_ones_of_a_cone() {
             }
             assert!(moved > 50, "{set:?}: {moved}");
         }
-        // A contact that is held keeps its normal force, and rubs in its direction with what that admits.
-        let set =
-            if rows == 2 { AdmissibleSet::Held2 { friction: 0.5 } } else { AdmissibleSet::Held3 { friction: 0.5 } };
-        for (x, share) in
-            [([2.0_f64, 3.0, 4.0], [1.0 / 3.0, 0.2]), ([-2.0, 3.0, 4.0], [0.0; 2]), ([9.0, 0.6, 0.8], [1.0; 2])]
-        {
-            let mut z = x[..rows].to_vec();
-            set.project(&mut z);
-            let near = |k: usize| (z[k] - share[rows - 2] * x[k]).abs() < 1e-15;
-            assert!((z[0] - x[0]).abs() < 1e-15 && (1..rows).all(near), "{x:?} to {z:?}");
-        }
     }
 }
 

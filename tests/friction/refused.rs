@@ -2,9 +2,7 @@
 
 use super::{masses, run};
 use contact_dynamics::contact::{ContactConstraint, ContactLaw, Contacts, GapRates, Rates};
-use contact_dynamics::contact_solver::{
-    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, GaussSeidel, Pivoting,
-};
+use contact_dynamics::contact_solver::Pivoting;
 use contact_dynamics::corrector::Release;
 use contact_dynamics::{CentralDifference, Error, LinearRows, Newmark, Result, SimulationBuilder, TchamwaWielgosz};
 
@@ -89,30 +87,4 @@ fn hosts_that_err_are_told() {
     assert!(silent.contains("give the rates of slip"), "{silent}");
     let infinite = host((0, 1.0), Rates::Given, f64::INFINITY).unwrap_err();
     assert!(matches!(infinite, Error::ContactNotFinite { what: "the slip rate", .. }), "{infinite}");
-}
-
-/// What a solver must take is what the scheme asks of it: contacts that do not open are asked for by corrections alone.
-#[test]
-fn a_solver_need_not_take_what_nobody_asks_for() {
-    #[derive(Debug)]
-    struct Unilateral(GaussSeidel);
-    impl ContactSolver<f64> for Unilateral {
-        fn admits(&self, set: AdmissibleSet) -> bool {
-            set.friction().is_none() || matches!(set, AdmissibleSet::Cone2 { .. } | AdmissibleSet::Cone3 { .. })
-        }
-        fn reserve(&mut self, size: usize) {
-            ContactSolver::<f64>::reserve(&mut self.0, size);
-        }
-        fn solve(
-            &mut self,
-            problem: &ContactProblem<'_, f64>,
-            multipliers: &mut [f64],
-        ) -> std::result::Result<usize, ContactFailure<f64>> {
-            self.0.solve(problem, multipliers)
-        }
-    }
-    let builder =
-        || scene().constraint(floor(ContactLaw::Rigid, 0.3)).contact_solver(Unilateral(GaussSeidel::default()));
-    assert_eq!(refusal(builder().uncorrected()), "taken");
-    assert!(refusal(builder()).contains("choose `ActiveSet`"), "{}", refusal(builder()));
 }

@@ -30,6 +30,8 @@ pub(super) struct Block<T> {
     pub(super) set: AdmissibleSet,
     /// Its friction per unit normal force, if that is given.
     pub(super) along: Option<[T; 2]>,
+    /// Whether it stays closed, by a normal force of either sign.
+    pub(super) is_bilateral: bool,
     /// The first tangent, in the coordinates in which it was given.
     axis: [T; 2],
 }
@@ -96,7 +98,8 @@ impl<T: Real> Rows<T> {
         let mut first = 0;
         blocks.extend(problem.data.sets.iter().enumerate().map(|(number, &set)| {
             let along = problem.data.along.get(number).copied().flatten();
-            let block = Block { first, set, along, axis: [T::one(), T::zero()] };
+            let is_bilateral = set.is_bilateral() || problem.data.holds && along.is_some();
+            let block = Block { first, set, along, is_bilateral, axis: [T::one(), T::zero()] };
             first += set.rows();
             block
         }));

@@ -58,9 +58,9 @@ impl<T: Real> Statuses<T> {
         memory::grow(multipliers, rows.len(), 1, WHAT)?;
         roles.clear();
         memory::make_room(roles, rows.len(), WHAT)?;
-        for Block { first, set, along, .. } in rows.blocks.iter().copied() {
+        for Block { first, set, along, is_bilateral, .. } in rows.blocks.iter().copied() {
             let pressed = guess[first] > T::zero() && set.friction().is_none();
-            let is_closed = set.is_bilateral() || pressed || rows.offset[first] < T::zero();
+            let is_closed = is_bilateral || pressed || rows.offset[first] < T::zero();
             let role = if is_closed { Role::Closed } else { Role::Open };
             roles.push(role);
             let of_tangents = if along.is_some() || !is_closed { Role::Given } else { role };
@@ -88,11 +88,11 @@ impl<T: Real> Statuses<T> {
         let mut change = false;
         self.looks += 1;
         for at in 0..rows.blocks.len() {
-            let Block { first, set, along, .. } = rows.blocks[at];
+            let Block { first, set, along, is_bilateral, .. } = rows.blocks[at];
             let lambda = self.multipliers[first];
             let tangents = rows.blocks[at].tangents();
             let closes = match self.roles[first] {
-                Role::Closed if set.is_bilateral() => true,
+                Role::Closed if is_bilateral => true,
                 Role::Closed => scaled(lambda, first, metric) >= -share * largest,
                 _ => rows.gap(first, x) < -(rows.tolerance[first] + share * widest),
             };

@@ -104,13 +104,12 @@ impl<T: Real> Correction<'_, T> {
         problem.clear();
         for &row in rows {
             let (own, friction) = (tangents.of(row), tangents.friction(row));
-            // A contact with friction is not held: where it pulled, it would have none (theory, section 18).
-            let is_held = own.is_empty() && pressed == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
-            let held = is_held || constraints.0.law(row).is_equality();
-            let set = match (own.len(), held) {
-                (0, true) => AdmissibleSet::Free,
-                (0, false) => AdmissibleSet::NonNegative,
-                (count, held) => AdmissibleSet::with_friction(friction, count, held),
+            let is_pressed = pressed == Pressed::Stays && contacts.lambda_raw[row] > T::zero();
+            let set = match own.len() {
+                0 if is_pressed || constraints.0.law(row).is_equality() => AdmissibleSet::Free,
+                0 => AdmissibleSet::NonNegative,
+                // It is not held: where it pulled, it would have no friction (theory, section 18).
+                count => AdmissibleSet::with_friction(friction, count),
             };
             let slides = jump == Jump::Acceleration && !own.is_empty() && contacts.sliding[row];
             let direction = slides.then(|| problem.direction(row).map(|f| T::of(friction) * f));

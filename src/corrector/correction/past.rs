@@ -184,8 +184,8 @@ impl<T: Real> Correction<'_, T> {
             let slides = !own.is_empty() && contacts.sliding[row] && !rebounds.leaves(row);
             if slides {
                 let direction = problem.direction(row).map(|f| T::of(tangents.friction(row)) * f);
-                let set = AdmissibleSet::with_friction(0.0, own.len(), true);
-                problem.add_block(&Block { direction: Some(direction), ..Block::new(row, own.len(), set) });
+                let block = Block::new(row, own.len(), AdmissibleSet::Free);
+                problem.add_block(&Block { direction: Some(direction), ..block });
             }
             for row in std::iter::once(row).chain(own) {
                 if !slides {

@@ -67,12 +67,10 @@ impl LawSupport {
         solver: &dyn ContactSolver<T>,
         (correctors, by_default): (&[ListedCorrector], bool),
     ) -> Self {
-        // Corrections pose problems with contacts that do not open.
         let is_corrected = by_default || !correctors.is_empty();
         let corrects = is_corrected && tableau.stages.iter().all(|stage| stage.contact == ContactLevel::POSITION);
-        let kinds: &[bool] = if corrects { &[false, true] } else { &[false] };
-        let cone = |tangents| kinds.iter().map(move |&held| AdmissibleSet::with_friction(0.0, tangents, held));
-        let sets = AdmissibleSet::OF_LAWS.into_iter().chain((1..=2).flat_map(cone));
+        let cones = (1..=2).map(|tangents| AdmissibleSet::with_friction(0.0, tangents));
+        let sets = AdmissibleSet::OF_LAWS.into_iter().chain(cones);
         let no_sets: Vec<_> = sets.filter(|&set| !solver.admits(set)).collect();
         // Formatting it takes longer than a step of a small system.
         let solver = if no_sets.is_empty() { String::new() } else { format!("{solver:?}") };
@@ -136,7 +134,7 @@ impl LawSupport {
             let range = "not negative and finite";
             return Err(Error::Parameter { name: "a friction coefficient", value: friction, range });
         }
-        let set = AdmissibleSet::with_friction(friction, tangents, false);
+        let set = AdmissibleSet::with_friction(friction, tangents);
         let kind = |other: &AdmissibleSet| other.rows() == set.rows();
         let reasons = [
             (tangents == 0 || tangents > 2)

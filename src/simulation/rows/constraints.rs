@@ -446,7 +446,7 @@ impl<'a, T: Real> Constraints<'a, T> {
     pub(crate) fn set(&self, row: usize) -> AdmissibleSet {
         match self.tangents.of(row).len() {
             0 => self.laws[row].into(),
-            rows => AdmissibleSet::with_friction(self.tangents.friction(row), rows, false),
+            rows => AdmissibleSet::with_friction(self.tangents.friction(row), rows),
         }
     }
 

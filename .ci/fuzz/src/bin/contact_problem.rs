@@ -65,10 +65,9 @@ fn set(input: &mut Input<'_>) -> AdmissibleSet {
     let friction = f64::from(input.byte()) / 100.0;
     match input.below(12) {
         0 | 1 => AdmissibleSet::Free,
-        2 => AdmissibleSet::Cone2 { friction },
-        3 => AdmissibleSet::Cone3 { friction },
-        4 => AdmissibleSet::Held2 { friction },
-        5 => AdmissibleSet::Held3 { friction: input.number() },
+        2 | 3 => AdmissibleSet::Cone2 { friction },
+        4 => AdmissibleSet::Cone3 { friction },
+        5 => AdmissibleSet::Cone3 { friction: input.number() },
         _ => AdmissibleSet::NonNegative,
     }
 }

@@ -150,7 +150,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
             (&mut *host.system, host.together),
             (clock.h, at),
             (assembly, residual),
-            RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[] },
+            RowData { g: curved.forces(g), rows, compliance: own, offset, tolerance, sets, along: &[], holds: false },
             multipliers,
             [problem_forces, response],
         )?;
