@@ -105,7 +105,7 @@ impl Loop {
             past: (0..table.depth()).map(state).collect(),
             g,
             solver: ActiveSet::default(),
-            projection: JumpProjection::new(Mass::Lumped(&MASS), &[], ROWS.len())?,
+            projection: JumpProjection::new(Mass::Lumped(&MASS), &[])?,
             raw: [0.0; ROWS.len()],
             force: [0.0; ROWS.len()],
         })

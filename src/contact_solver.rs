@@ -19,13 +19,11 @@ pub use active_set::ActiveSet;
 pub(crate) use failure::{contact_error, no_response};
 pub use gauss_seidel::GaussSeidel;
 pub use pivoting::Pivoting;
+pub(crate) use problem::new_version;
 pub use problem::{AdmissibleSet, ContactProblem};
 pub(crate) use projected_cg::{Body, Outcome, Patience, ProjectedCg, RowData, SparseProblem};
 
 use crate::real::Real;
-
-/// Number of rows for which memory is reserved at build; larger problems get memory at their first solve.
-pub(crate) const FORESEEN: usize = 128;
 
 /// From this many rows on, cubic cost is avoided, and so is one solve per row in repeated assemblies.
 pub(crate) const MANY: usize = 256;
@@ -87,7 +85,6 @@ impl Assembly {
 /// use contact_dynamics::{ActiveSet, ContactSolver};
 ///
 /// let mut solver: Box<dyn ContactSolver<f64>> = Box::new(ActiveSet::default());
-/// solver.reserve(2);
 /// let sets = [AdmissibleSet::NonNegative; 2];
 /// let problem = ContactProblem::new(&[2.0, 1.0, 1.0, 2.0], &[-2.0, 1.0], &sets, &[1e-14; 2]).unwrap();
 /// let mut lambda = [0.0; 2];
@@ -102,15 +99,9 @@ pub trait ContactSolver<T: Real>: std::fmt::Debug + Send {
         set.rows() == 1
     }
 
-    /// Announces problems of up to `size` rows: a solver that allocates no memory in [`solve`](Self::solve) reserves
-    /// it here. Called at build, and before the first problem with more rows than announced, then for up to twice as
-    /// many. Default: reserves no memory.
-    fn reserve(&mut self, size: usize) {
-        let _ = size;
-    }
-
     /// Solves; `multipliers` holds a guess on entry (rows with λ > 0 are first taken as active) and the solution on
     /// exit. The guess may change the work, but the result only within rounding. Returns the number of iterations.
+    /// Memory that a solver keeps for the next problem makes steady steps free of allocation.
     ///
     /// # Errors
     ///
@@ -133,9 +124,6 @@ impl<T: Real, S: ContactSolver<T> + ?Sized> ContactSolver<T> for Box<S> {
     }
     fn admits(&self, set: AdmissibleSet) -> bool {
         (**self).admits(set)
-    }
-    fn reserve(&mut self, size: usize) {
-        (**self).reserve(size);
     }
     fn solve(
         &mut self,

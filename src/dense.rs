@@ -43,39 +43,6 @@ enum Kind {
 const BLOCKED: usize = 48;
 
 impl<T: Real> DenseCholesky<T> {
-    pub(crate) fn with_capacity(size: usize) -> Self {
-        let mut scratch = Scratch::default();
-        scratch.get(T::dense_cholesky_scratch(size).or(T::dense_lu_scratch(size)));
-        Self {
-            size: 0,
-            l: Vec::with_capacity(size * size),
-            first: Vec::with_capacity(size),
-            diagonal: Vec::with_capacity(size),
-            independent: Vec::with_capacity(size),
-            kind: Kind::Skyline,
-            normal: Vec::with_capacity(size * size),
-            reduced: Vec::with_capacity(size),
-            inverse: Vec::with_capacity(size),
-            scratch,
-        }
-    }
-
-    /// Memory for [`factorize_general`](Self::factorize_general) only.
-    pub(crate) fn with_general_capacity(size: usize) -> Self {
-        let mut scratch = Scratch::default();
-        scratch.get(T::dense_lu_scratch(size));
-        Self {
-            l: Vec::with_capacity(size * size),
-            first: Vec::with_capacity(size),
-            diagonal: Vec::with_capacity(size),
-            independent: Vec::with_capacity(size),
-            reduced: Vec::with_capacity(size),
-            inverse: Vec::with_capacity(size),
-            scratch,
-            ..Self::default()
-        }
-    }
-
     /// Factorizes the matrix with entries `entry(i, j)`, j ≤ i.
     ///
     /// A row is dependent if its pivot is less than `size · 64 ε` of its diagonal entry, or at most the rounding of
@@ -91,6 +58,7 @@ impl<T: Real> DenseCholesky<T> {
         let Self { l, first, diagonal, independent, kind, reduced, scratch, .. } = self;
         self.size = size;
         l.clear();
+        l.reserve_exact(size * size);
         l.resize(size * size, T::zero());
         first.clear();
         diagonal.clear();
@@ -176,6 +144,7 @@ impl<T: Real> DenseCholesky<T> {
         scale.clear();
         scale.extend((0..size).map(|i| T::of(2.0).powi((largest - exponent(i)) / 2)));
         l.clear();
+        l.reserve_exact(size * size);
         for i in 0..size {
             l.extend((0..size).map(|j| entry(i, j) * scale[i] * scale[j]));
             if !T::all_finite(&l[i * size..]) {
@@ -218,6 +187,7 @@ impl<T: Real> DenseCholesky<T> {
         let Self { size, l, independent, normal, reduced, .. } = self;
         let (n, rank) = (*size, independent.len());
         normal.clear();
+        normal.reserve_exact(rank * rank);
         normal.resize(rank * rank, T::zero());
         let mut count = 0;
         for k in 0..n {
@@ -335,7 +305,7 @@ mod tests {
     #[test]
     fn solves_with_a_skyline() {
         let a = [[4.0, 0.0, 2.0], [0.0, 3.0, 0.0], [2.0, 0.0, 5.0]];
-        let mut factor = DenseCholesky::with_capacity(3);
+        let mut factor = DenseCholesky::default();
         factor.factorize(3, |i, j| a[i][j]).unwrap();
         let mut x = [8.0_f64, 3.0, 12.0];
         factor.solve(&mut x);
@@ -363,7 +333,7 @@ mod tests {
             };
             let x: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sin() / unit(i)).collect();
             let mut b: Vec<f64> = (0..n).map(|i| (0..n).map(|j| a(i, j) * x[j]).sum()).collect();
-            let mut factor = DenseCholesky::with_capacity(n);
+            let mut factor = DenseCholesky::default();
             factor.factorize_general(n, a).unwrap();
             assert!(!factor.is_singular());
             factor.solve(&mut b);
@@ -371,7 +341,7 @@ mod tests {
                 assert!((b - x).abs() * unit(i) < 1e-9, "{n}, row {i}: {b} {x}");
             }
         }
-        let mut factor = DenseCholesky::with_capacity(3);
+        let mut factor = DenseCholesky::default();
         // The third row is the sum of the others.
         let a = [[2.0, 1.0, 0.5], [-1.0, 3.0, 0.1], [1.0, 4.0, 0.6]];
         factor.factorize_general(3, |i, j| a[i][j]).unwrap();
@@ -387,7 +357,7 @@ mod tests {
         for n in [1, 2, 3, 9, 40, 90] {
             let a = |i: usize, j: usize| ((i * 13 + j * 7 + i * j * j) as f64).sin() + if i == j { 2.0 } else { 0.0 };
             let solution = |unit: f64| -> Vec<u64> {
-                let mut factor = DenseCholesky::with_general_capacity(n);
+                let mut factor = DenseCholesky::default();
                 factor.factorize_general(n, |i, j| unit * a(i, j)).unwrap();
                 let mut x: Vec<f64> = (0..n).map(|i| unit * (i as f64).cos()).collect();
                 factor.solve(&mut x);
@@ -410,7 +380,7 @@ mod tests {
             // x = A z is in the range of A, hence the solution of least norm of A x = A A z.
             let x = times(&z);
             let mut solution = times(&x);
-            let mut factor = DenseCholesky::with_capacity(n);
+            let mut factor = DenseCholesky::default();
             factor.factorize(n, |i, j| a[i][j]).unwrap();
             assert_eq!(factor.is_singular(), rank < n);
             factor.solve(&mut solution);

@@ -24,7 +24,7 @@ pub(crate) fn make_room<T>(vector: &mut Vec<T>, entries: usize, what: &'static s
     vector.try_reserve(entries).map_err(|_| refused::<T>(vector.len().saturating_add(entries), what))
 }
 
-/// Resizes a vector to `rows · columns` entries, new ones zero; nonzero capacity at least doubles when it must grow.
+/// Resizes a vector to `rows · columns` entries, new ones zero. It gets no more memory than for these.
 pub(crate) fn grow<T: Zero + Clone>(
     vector: &mut Vec<T>,
     rows: usize,
@@ -32,10 +32,7 @@ pub(crate) fn grow<T: Zero + Clone>(
     what: &'static str,
 ) -> Result<()> {
     let size = rows.checked_mul(columns).ok_or(Error::OutOfMemory { what, bytes: None })?;
-    match vector.capacity() {
-        0 => *vector = reserve(size, 1, what)?,
-        _ => make_room(vector, size.saturating_sub(vector.len()), what)?,
-    }
+    vector.try_reserve_exact(size.saturating_sub(vector.len())).map_err(|_| refused::<T>(size, what))?;
     vector.resize(size, T::zero());
     Ok(())
 }

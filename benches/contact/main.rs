@@ -192,7 +192,6 @@ fn interface(mut factor: Box<dyn Factorization<f64>>, dofs: usize, candidates: u
     let w = Rc::new(w);
     for (name, known) in [("contact solver, first time", false), ("contact solver, nothing changed", true)] {
         let (w, mut solver) = (Rc::clone(&w), ActiveSet::default());
-        ContactSolver::<f64>::reserve(&mut solver, candidates);
         let (offset, sets) = (vec![-1.0; candidates], vec![AdmissibleSet::NonNegative; candidates]);
         let (tolerance, mut multipliers) = (vec![1e-14; candidates], vec![0.0; candidates]);
         table.row(format!("{name}, {candidates} rows"), move || {

@@ -33,7 +33,7 @@ pub(super) fn set_friction<T: Real>(
 }
 
 /// Rows, gaps g* and displacements u* of the linearization: `g = g* + G (u − u*)`.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct AffineRows<T> {
     pub(super) jacobian: ContactJacobian<T>,
     gaps: Vec<f64>,
@@ -42,14 +42,6 @@ pub(super) struct AffineRows<T> {
 }
 
 impl<T: Real> AffineRows<T> {
-    pub(super) fn with_capacity(rows: usize, entries: usize) -> Self {
-        Self {
-            jacobian: ContactJacobian::with_capacity(rows, entries),
-            gaps: Vec::with_capacity(rows),
-            displacements: Vec::with_capacity(entries),
-        }
-    }
-
     pub(super) fn clear(&mut self) {
         self.jacobian.clear();
         self.gaps.clear();

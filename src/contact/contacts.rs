@@ -160,12 +160,6 @@ impl<T: Real> Contacts<T> {
         self.list.iter().any(|data| data.friction != 0.0)
     }
 
-    /// The number of tangents of candidates with friction.
-    pub(crate) fn friction_rows(&self) -> usize {
-        let has_friction = |contact: &usize| self.friction(*contact) != 0.0;
-        (0..self.len()).filter(has_friction).map(|contact| self.tangents_of(contact).len()).sum()
-    }
-
     /// The position of a contact, if its constraint has set it.
     pub fn position(&self, contact: usize) -> Option<[T; 3]> {
         self.list[contact].position

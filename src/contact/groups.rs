@@ -22,19 +22,6 @@ pub(crate) struct Groups {
 const FREE: usize = usize::MAX;
 
 impl Groups {
-    /// Reserves memory for `rows` rows that act on dofs below `dofs`.
-    pub(crate) fn with_capacity(rows: usize, dofs: usize) -> Self {
-        let reserved = |n| Vec::with_capacity(n);
-        Self {
-            positions: reserved(rows),
-            starts: reserved(rows + 1),
-            leader: reserved(rows),
-            owner: vec![FREE; dofs],
-            place: reserved(rows),
-            next: reserved(rows + 1),
-        }
-    }
-
     /// Groups rows by the dofs (below `dofs`) on which they act. A row that is tied to the one before it in the list
     /// is in the group of that row, whatever its dofs.
     pub(crate) fn sort<D: Iterator<Item = usize>>(

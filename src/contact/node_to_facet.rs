@@ -244,8 +244,7 @@ impl<T: Real> NodeToFacet<T> {
         Ok(contact)
     }
 
-    /// From nodes (ascending), a surface, and the same surface again if it is against itself; memory for rows is not
-    /// reserved yet.
+    /// From nodes (ascending), a surface, and the same surface again if it is against itself.
     fn between(mesh: Nodes, nodes: Vec<usize>, surface: Surface, own_surface: Option<Surface>) -> Result<Self> {
         let settings = SurfaceSettings::new();
         Ok(Self {
@@ -259,8 +258,8 @@ impl<T: Real> NodeToFacet<T> {
             leaves_edges: false,
             rebuilds: 0,
             cones: [Cones::default(), Cones::default()],
-            rows: Rows::with_capacity(0, 0),
-            found: Rows::with_capacity(0, 0),
+            rows: Rows::default(),
+            found: Rows::default(),
         })
     }
 
@@ -352,7 +351,7 @@ impl<T: Real> NodeToFacet<T> {
         Ok(())
     }
 
-    /// Checks that the bodies share no node, and reserves memory for rows.
+    /// Checks that the bodies share no node, and forgets rows.
     fn prepare(&mut self) -> Result<()> {
         let mut body = self.passes[0].nodes.clone();
         body.extend(self.own_surface.iter().flat_map(Surface::nodes));
@@ -362,23 +361,9 @@ impl<T: Real> NodeToFacet<T> {
             false => self.nodes.read_bodies([body, self.surface.nodes().to_vec()])?,
             true => self.nodes.read_body(body),
         }
-        let (rows, entries) = self.most();
-        self.rows = Rows::with_capacity(rows, entries);
-        self.found = Rows::with_capacity(rows, entries);
+        self.rows.clear();
         self.vicinity.forget();
         Ok(())
-    }
-
-    /// Numbers of rows and of their entries to reserve: two rows per node, because some nodes are in dents.
-    fn most(&self) -> (usize, usize) {
-        let surfaces = [Some(&self.surface), self.own_surface.as_ref()];
-        let entries = |(pass, surface): (&Pass, &Surface)| {
-            let vertices = surface.facets().iter().map(|facet| facet.nodes().len()).max().unwrap_or(0);
-            pass.nodes.len() * self.nodes.dimension * (1 + vertices)
-        };
-        let rows: usize = self.passes.iter().map(|pass| pass.nodes.len()).sum();
-        let entries: usize = self.passes.iter().zip(surfaces.into_iter().flatten()).map(entries).sum();
-        (2 * rows, 2 * entries)
     }
 
     fn finest(&self) -> f64 {

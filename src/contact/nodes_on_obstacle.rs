@@ -155,8 +155,6 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
             Node { number, place: coordinates[number], dofs }
         };
         let nodes: Vec<_> = nodes.iter().map(&mut node).collect();
-        let capacity = nodes.len();
-        let (rows, before) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
         let (obstacle, law) = (Box::new(obstacle), ContactLaw::Rigid);
         let acts = vec![false; list.as_slice().len()];
         let (reach, friction) = (T::infinity(), Friction::Constant(0.0));
@@ -170,8 +168,8 @@ impl<'a, T: Real, const D: usize> NodesOnObstacle<'a, T, D> {
             motion: Motion::Rest,
             friction,
             drag: None,
-            rows,
-            before,
+            rows: Vec::new(),
+            before: Vec::new(),
         };
         contact.find_acting_dofs();
         Ok(contact)

@@ -70,13 +70,6 @@ impl<T> ContactJacobian<T> {
 }
 
 impl<T: Real> ContactJacobian<T> {
-    pub(crate) fn with_capacity(rows: usize, entries: usize) -> Self {
-        let mut pointers = Vec::with_capacity(rows + 1);
-        pointers.push(0);
-        let (dofs, places) = (Vec::with_capacity(entries), Vec::with_capacity(entries));
-        Self { pointers, dofs, weights: Vec::with_capacity(entries), places, largest: None, normals: None }
-    }
-
     /// Marks the rows so far as normal rows; tangential rows follow.
     pub(crate) fn end_normals(&mut self) {
         self.normals = Some(self.rows());
@@ -161,10 +154,6 @@ impl<T: Real> ContactJacobian<T> {
         for row in rows {
             self.push_entries(other.row(row).map(|(place, weight)| (list[place], weight)));
         }
-    }
-
-    pub(crate) fn entries(&self) -> usize {
-        self.dofs.len()
     }
 
     /// The (dof, weight) pairs of a row.
@@ -253,17 +242,6 @@ pub(crate) struct RowProducts<T> {
 const NO_ROW: usize = usize::MAX;
 
 impl<T: Real> RowProducts<T> {
-    /// Memory for rows on this number of dofs.
-    pub(crate) fn reserve(&mut self, rows: usize, dofs: usize) {
-        self.numbers.resize(dofs.max(self.numbers.len()), NO_ROW);
-        self.dofs.reserve(4 * rows);
-        self.starts.reserve(4 * rows + 2);
-        self.acting.reserve(4 * rows);
-        self.sums.reserve(rows);
-        self.visited.reserve(rows);
-        self.is_visited.reserve(rows);
-    }
-
     /// Lists rows, of which `row` returns the (dof, weight) pairs, on this number of dofs.
     pub(crate) fn list<R: Iterator<Item = (usize, T)>>(
         &mut self,

@@ -192,10 +192,6 @@ pub(super) struct Gaps<T> {
 }
 
 impl<T: Real> Gaps<T> {
-    pub(super) fn with_capacity(rows: usize) -> Self {
-        Self { y: Vec::with_capacity(rows), own: Vec::with_capacity(rows) }
-    }
-
     /// Evaluates y for the multipliers `solution` of the active `rows`, column by column.
     pub(super) fn evaluate(
         &mut self,

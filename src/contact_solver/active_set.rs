@@ -4,7 +4,7 @@ use super::acceptance::{Acceptance, Gaps, Settings};
 use super::cone_newton::ConeNewton;
 use super::equations::Equations;
 use super::structure::Structure;
-use super::{AdmissibleSet, Assembly, ContactFailure, ContactProblem, ContactSolver, FORESEEN, Pivoting};
+use super::{AdmissibleSet, Assembly, ContactFailure, ContactProblem, ContactSolver, Pivoting};
 use crate::real::Real;
 use crate::rounding::half_digits;
 
@@ -196,24 +196,6 @@ impl<T: Real> ContactSolver<T> for ActiveSet<T> {
     /// All sets are supported.
     fn admits(&self, _set: AdmissibleSet) -> bool {
         true
-    }
-
-    fn reserve(&mut self, size: usize) {
-        let mut pivoting = Pivoting::default();
-        pivoting.reserve(size.min(FORESEEN));
-        *self = Self {
-            assembly: self.assembly,
-            equations: Equations::with_capacity(size),
-            structure: Structure::with_capacity(size),
-            active: Vec::with_capacity(size),
-            rows: Vec::with_capacity(size),
-            solution: Vec::with_capacity(size),
-            violating: Vec::with_capacity(size),
-            gaps: Gaps::with_capacity(size),
-            center: Vec::with_capacity(size),
-            pivoting,
-            ..Self::default()
-        };
     }
 
     fn assembly(&self) -> Assembly {

@@ -64,9 +64,6 @@ impl<T: Real> ConeNewton<T> {
         multipliers: &mut [T],
     ) -> Result<usize, ContactFailure<T>> {
         let size = acceptance.problem().size();
-        if self.y.capacity() < size {
-            *self = Self::with_capacity(size);
-        }
         let mut spent = 0;
         // A sweep costs about 3/n of an iteration with few rows: first up to half of an iteration's worth of sweeps, as
         // long as they converge.
@@ -84,22 +81,6 @@ impl<T: Real> ConeNewton<T> {
             return Ok(spent);
         }
         Err(acceptance.failure(spent, multipliers))
-    }
-
-    fn with_capacity(size: usize) -> Self {
-        let reals = || Vec::with_capacity(size);
-        Self {
-            sweeps: Sweeps::with_capacity(size),
-            factor: DenseCholesky::with_general_capacity(size),
-            statuses: Vec::with_capacity(size),
-            rows: Vec::with_capacity(size),
-            matrix: Vec::with_capacity(size * size),
-            right: reals(),
-            y: reals(),
-            tried: reals(),
-            found: reals(),
-            ..Self::default()
-        }
     }
 
     /// Newton iterations; returns whether they have converged without pulling contacts. If not, the multipliers are
@@ -153,6 +134,7 @@ impl<T: Real> ConeNewton<T> {
         let (mut share, mut solved) = (T::of(FIRST_SHARE), false);
         for _ in 0..PROXIMAL_STEPS {
             shifted.clear();
+            shifted.reserve_exact(size * size);
             shifted.extend_from_slice(problem.delassus);
             offset.clear();
             offset.extend_from_slice(problem.offset);
@@ -200,6 +182,7 @@ impl<T: Real> ConeNewton<T> {
         }
         let size = rows.len();
         matrix.clear();
+        matrix.reserve_exact(size * size);
         right.clear();
         for ((block, set), &status) in problem.blocks().zip(statuses.iter()) {
             if matches!(status, Status::Open) {

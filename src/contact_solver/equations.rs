@@ -3,7 +3,7 @@
 
 use super::many_rows::ManyRows;
 use super::structure::{Structure, Symmetry};
-use super::{ContactProblem, FORESEEN, MANY};
+use super::{ContactProblem, MANY};
 use crate::dense::DenseCholesky;
 use crate::real::Real;
 
@@ -41,13 +41,6 @@ impl Block {
 }
 
 impl<T: Real> Equations<T> {
-    /// Memory for up to `rows` rows. For many rows the factor is a fallback and is allocated only when needed.
-    pub(super) fn with_capacity(rows: usize) -> Self {
-        let block = || Block { version: None, rows: Vec::with_capacity(rows) };
-        let factor = DenseCholesky::with_capacity(if rows < MANY { rows } else { FORESEEN });
-        Self { factor, factored: block(), dependent: block(), ..Self::default() }
-    }
-
     /// Discards what is kept of earlier problems.
     pub(super) fn forget(&mut self) {
         self.factored.version = None;

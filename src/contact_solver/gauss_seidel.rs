@@ -99,11 +99,6 @@ impl<T: Real> ContactSolver<T> for GaussSeidel<T> {
         true
     }
 
-    fn reserve(&mut self, size: usize) {
-        self.structure = Structure::with_capacity(size);
-        self.sweeps = Sweeps::with_capacity(size);
-    }
-
     fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,

@@ -303,7 +303,7 @@ mod tests {
                 assert!(many.prepare(&problem, &structure, &rows));
                 let mut x: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
                 *most = many.solve(&problem, &structure, &rows, &mut x).unwrap();
-                let mut factor = DenseCholesky::with_capacity(n);
+                let mut factor = DenseCholesky::default();
                 factor.factorize(rows.len(), |i, j| w[rows[i] * n + rows[j]]).unwrap();
                 let mut direct: Vec<f64> = rows.iter().map(|&i| b[i]).collect();
                 factor.solve(&mut direct);

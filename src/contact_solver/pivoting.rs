@@ -100,17 +100,10 @@ struct Response<T> {
 }
 
 impl<T: Real> Basis<T> {
-    fn reserve(&mut self, size: usize) {
-        self.rows = Vec::with_capacity(size);
-        self.factor = Vec::with_capacity(size * size);
-        self.entry = Vec::with_capacity(size);
-        self.direction = Vec::with_capacity(size);
-        self.right = Vec::with_capacity(size);
-    }
-
     fn clear(&mut self, size: usize) {
         self.rows.clear();
         self.factor.clear();
+        self.factor.reserve_exact(size * size);
         self.factor.resize(size * size, T::zero());
         self.stride = size;
     }
@@ -314,12 +307,6 @@ impl<T: Real> Pivoting<T> {
 }
 
 impl<T: Real> ContactSolver<T> for Pivoting<T> {
-    fn reserve(&mut self, size: usize) {
-        self.basis.reserve(size);
-        self.status = Vec::with_capacity(size);
-        self.sweeps = Sweeps::with_capacity(size);
-    }
-
     fn solve(&mut self, problem: &ContactProblem<'_, T>, multipliers: &mut [T]) -> Result<usize, ContactFailure<T>> {
         let size = problem.size();
         multipliers.fill(T::zero());

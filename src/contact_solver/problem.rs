@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::real::Real;
 use crate::rounding::rounding;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The set of the multipliers of a block of rows, which also determines the conditions between them and the block's
 /// y.
@@ -188,6 +189,12 @@ pub struct ContactProblem<'a, T> {
     pub(crate) sets: &'a [AdmissibleSet],
     pub(crate) tolerance: &'a [T],
     pub(crate) version: u64,
+}
+
+/// A [version](ContactProblem::with_version) that no other W has: a solver may come from another run, or from a host.
+pub(crate) fn new_version() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1 << 63);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 impl<'a, T: Real> ContactProblem<'a, T> {

@@ -28,11 +28,6 @@ pub(super) struct Structure {
 const LANES: usize = 4;
 
 impl Structure {
-    /// Memory for this many rows.
-    pub(super) fn with_capacity(rows: usize) -> Self {
-        Self { ranges: Vec::with_capacity(rows), ..Self::default() }
-    }
-
     /// Whether this is the structure of the problem's W, by its version.
     pub(super) fn is_known<T: Real>(&self, problem: &ContactProblem<'_, T>) -> bool {
         problem.version != 0 && self.version == problem.version

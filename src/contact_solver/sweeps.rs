@@ -28,11 +28,6 @@ pub(super) struct Schedule<T> {
 }
 
 impl<T: Real> Sweeps<T> {
-    /// Memory for this many rows.
-    pub(super) fn with_capacity(rows: usize) -> Self {
-        Self { symmetry: Symmetry::Symmetric, behind: Vec::with_capacity(rows), next: Vec::with_capacity(rows) }
-    }
-
     /// Sweeps until the problem is solved; returns whether it is solved and counts the sweeps.
     pub(super) fn solve(
         &mut self,

@@ -1,10 +1,9 @@
-//! Memory of the corrections, reserved when a simulation is built.
+//! Memory of the corrections.
 
 use super::jump_problem::JumpProblem;
 use super::rebounds::Rebounds;
 use super::switching::Switching;
 use crate::contact::GapRates;
-use crate::contact_solver::FORESEEN;
 use crate::real::Real;
 use crate::state::{Changes, ContactState};
 
@@ -105,17 +104,10 @@ impl<T: Real> Given<T> {
     }
 }
 
-/// Reserves memory for this many entries.
-fn reserve<V>(lists: &mut [&mut Vec<V>], entries: usize) {
-    for list in lists {
-        list.reserve(entries.saturating_sub(list.len()));
-    }
-}
-
 impl<T: Real> Buffers<T> {
-    /// Reserves memory for `rows` contacts, for velocity changes of `damped` dofs (0 without damping), for predictions
-    /// of `predicted` dofs (0 without), and, if contacts without mass are corrected, for velocity changes of
-    /// `switching` dofs.
+    /// Memory for `rows` rows, for velocity changes of `damped` dofs (0 without damping), for predictions of
+    /// `predicted` dofs (0 without), and, if contacts without mass are corrected, for velocity changes of `switching`
+    /// dofs.
     pub(crate) fn new(rows: usize, [damped, predicted]: [usize; 2], switching: Option<usize>) -> Self {
         let vector = || vec![T::zero(); damped];
         let mut buffers = Self {
@@ -123,7 +115,7 @@ impl<T: Real> Buffers<T> {
             problem: Box::default(),
             impulses: Removal::default(),
             forces: Removal::default(),
-            scratch: Vec::with_capacity(rows.min(FORESEEN) * rows.min(FORESEEN)),
+            scratch: Vec::new(),
             rebounds: Box::default(),
             readings: Readings::default(),
             damping: Damping {
@@ -135,31 +127,18 @@ impl<T: Real> Buffers<T> {
                 moved: Vec::new(),
             },
             shifted: vec![T::zero(); predicted],
-            switching: Box::new(Switching::new(rows, switching)),
+            switching: Box::new(Switching::new(switching)),
             given: Given::default(),
             changes: None,
         };
-        buffers.make_room(rows);
+        buffers.resize(rows);
         buffers
     }
 
-    /// Reserves memory for this many contacts.
-    pub(crate) fn make_room(&mut self, rows: usize) {
-        let Self { rows: own, problem, impulses, forces, readings, damping, switching, given, .. } = self;
-        let StageRows { closed, engaged, opened, released, reported, impacts } = own;
-        readings.rates.resize(rows, GapRates::default());
-        readings.gaps.resize(rows, T::zero());
-        switching.make_room(rows);
-        problem.make_room(rows);
-        reserve(&mut [closed, engaged, opened, released, &mut given.rows, &mut given.group], rows);
-        reserve(&mut [reported, impacts, &mut given.energies, &mut given.impulses, &mut given.shares], rows);
-        for Removal { rows: own, multipliers, normal } in [impulses, forces] {
-            reserve(&mut [own], rows);
-            reserve(&mut [multipliers, normal], rows);
-        }
-        if !damping.change.is_empty() {
-            reserve(&mut [&mut damping.limited, &mut damping.moved], rows);
-        }
+    /// Lists with an entry for each of so many rows.
+    pub(crate) fn resize(&mut self, rows: usize) {
+        self.readings.rates.resize(rows, GapRates::default());
+        self.readings.gaps.resize(rows, T::zero());
     }
 
     /// Stores the contacts before a stage; `first` marks the first stage of a step.

@@ -3,9 +3,7 @@
 use super::JumpProjection;
 use super::many_jumps::ManyJumps;
 use crate::contact::{ContactId, ContactJacobian};
-use crate::contact_solver::{
-    AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, FORESEEN, contact_error, no_response,
-};
+use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, ContactSolver, contact_error, no_response};
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
@@ -108,27 +106,11 @@ struct Group<T> {
     /// Multipliers of the next pass of an iteration.
     next: Vec<T>,
     factor: DenseCholesky<T>,
-    /// Rows that the factor has memory for.
-    reserved: usize,
 }
 
 type Solved<T> = std::result::Result<(), ContactFailure<T>>;
 
 impl<T: Real> JumpProblem<T> {
-    /// Reserves memory for this many rows, and for groups of up to `FORESEEN` of them.
-    pub(super) fn make_room(&mut self, rows: usize) {
-        let Self { blocks, rows: own, owners, jump, tolerance, base, totals, increments, left, noise, group, .. } =
-            self;
-        blocks.reserve(rows.saturating_sub(blocks.len()));
-        for list in [own, owners] {
-            list.reserve(rows.saturating_sub(list.len()));
-        }
-        for values in [jump, tolerance, base, totals, increments, left, noise] {
-            values.reserve(rows.saturating_sub(values.len()));
-        }
-        group.make_room(rows.min(FORESEEN));
-    }
-
     /// Removes all blocks.
     pub(crate) fn clear(&mut self) {
         let Self { blocks, rows, owners, jump, tolerance, base, totals, increments, left, noise, .. } = self;
@@ -344,28 +326,6 @@ impl<T: Real> JumpProblem<T> {
 }
 
 impl<T: Real> Group<T> {
-    /// Reserves memory for this many rows.
-    fn make_room(&mut self, rows: usize) {
-        self.reserve_factor(rows);
-        let Self { rows: own, s, unknowns, delassus, friction, offset, sets, tolerance, multipliers, next, .. } = self;
-        for list in [own, unknowns] {
-            list.reserve(rows.saturating_sub(list.len()));
-        }
-        for matrix in [s, delassus, friction] {
-            matrix.reserve((rows * rows).saturating_sub(matrix.len()));
-        }
-        for values in [offset, tolerance, multipliers, next] {
-            values.reserve(rows.saturating_sub(values.len()));
-        }
-        sets.reserve(rows.saturating_sub(sets.len()));
-    }
-
-    fn reserve_factor(&mut self, rows: usize) {
-        if rows > self.reserved {
-            (self.factor, self.reserved) = (DenseCholesky::with_capacity(rows), rows);
-        }
-    }
-
     /// Sets up the problem of the rows at these positions, with S given: one unknown per row, but a single unknown
     /// per sliding contact, whose friction is proportional to the normal multiplier.
     fn pose(&mut self, all: &JumpProblem<T>, positions: &[usize]) {
@@ -389,6 +349,8 @@ impl<T: Real> Group<T> {
             });
             at += 1 + tangents;
         }
+        delassus.reserve_exact(unknowns.len().pow(2));
+        friction.reserve_exact(if slides { unknowns.len().pow(2) } else { 0 });
         let known = |at: usize| block(at).known.filter(|_| block(at).place == positions[at]);
         let largest = (0..size).map(|i| s[i * size + i]).fold(T::zero(), T::max);
         for &i in unknowns.iter() {
@@ -437,7 +399,6 @@ impl<T: Real> Group<T> {
         /// Friction of a normal force changes that force by some tenths of its size at most, except near jamming.
         const PASSES: usize = 100;
         let size = self.offset.len();
-        self.reserve_factor(size);
         let Self { delassus, friction, offset, multipliers, next, factor, .. } = self;
         let slides = !friction.is_empty();
         let friction = |i: usize, j: usize| friction.get(i * size + j).copied().unwrap_or(T::zero());

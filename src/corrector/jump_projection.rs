@@ -1,7 +1,6 @@
 //! Mass-weighted removal of jumps: x ← x − M⁻¹ Gᵀ S⁻¹ (G x − γ), S = G M⁻¹ Gᵀ.
 
 use crate::contact::{ContactId, ContactJacobian, Groups, RowProducts};
-use crate::contact_solver::FORESEEN;
 use crate::contact_solver::no_response;
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
@@ -28,7 +27,7 @@ use crate::sparse;
 /// let (mass, h) = ([2.0_f64, 1.0], 1e-3);
 /// let mut g = ContactJacobian::default();
 /// g.push(&[(0, -1.0), (1, 1.0)]);
-/// let mut projection = JumpProjection::new(Mass::Lumped(&mass), &[], g.rows())?;
+/// let mut projection = JumpProjection::new(Mass::Lumped(&mass), &[])?;
 /// projection.close(&g, &[0])?;
 ///
 /// // Approach speed 3 at the contact, accelerations −50 and 100 from the solve with 5/2 z-weight (composite scheme).
@@ -65,7 +64,7 @@ pub struct JumpProjection<T: Real> {
 }
 
 /// Columns of M⁻¹ Gᵀ, computed when their rows are first closed; consistent masses only.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Columns<T> {
     /// For each row the slot of its column.
     slots: Vec<usize>,
@@ -97,11 +96,10 @@ const NONE: usize = usize::MAX;
 
 /// Up to this many rows are pushed along their columns; more rows are pushed by one solve for all, because columns of
 /// hundreds of rows would take as much memory as a factor of M. At most this many columns with all places are kept.
-const FEW: usize = FORESEEN;
+const FEW: usize = 128;
 
 impl<T: Real> JumpProjection<T> {
-    /// Prepares the projection for up to `rows` contacts. `prescribed` dofs (ascending) and dofs without mass do not
-    /// respond.
+    /// Prepares the projection. `prescribed` dofs (ascending) and dofs without mass do not respond.
     ///
     /// # Errors
     ///
@@ -109,7 +107,7 @@ impl<T: Real> JumpProjection<T> {
     /// indefinite on the free dofs, [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::MissingDof`] and
     /// [`Error::RepeatedDof`] for prescribed dofs that do not exist or do not ascend, [`Error::Dimension`],
     /// [`Error::MatrixNotFinite`] and [`Error::Asymmetric`] for a matrix that is not square, finite or symmetric.
-    pub fn new(mass: Mass<'_, T>, prescribed: &[usize], rows: usize) -> Result<Self> {
+    pub fn new(mass: Mass<'_, T>, prescribed: &[usize]) -> Result<Self> {
         let dofs = match mass {
             Mass::Lumped(mass) => mass.len(),
             Mass::Consistent(mass) => sparse::square("the mass matrix", mass)?,
@@ -124,38 +122,22 @@ impl<T: Real> JumpProjection<T> {
                 false => Error::Incompatible { part: what.into(), reason: "it is not ascending" },
             });
         }
-        Self::with(InverseMass::new(mass, prescribed, &[])?, dofs, rows)
+        Ok(Self::with(InverseMass::new(mass, prescribed, &[])?, dofs))
     }
 
-    pub(crate) fn with(inverse: InverseMass<T>, dofs: usize, rows: usize) -> Result<Self> {
-        memory::reserve::<usize>(rows, 8, "a jump projection")?;
-        let (stored, keys) = match inverse {
-            InverseMass::Lumped(_) => (0, if rows > 0 { dofs } else { 0 }),
-            InverseMass::Consistent(_) => (rows, 0),
-        };
-        // Columns of small systems are reserved at once; they take little memory.
-        let foreseen = if stored.saturating_mul(dofs) <= FORESEEN * FORESEEN { stored } else { 0 };
-        let mut products = RowProducts::default();
-        products.reserve(keys.min(rows).min(FORESEEN), keys);
-        Ok(Self {
+    pub(crate) fn with(inverse: InverseMass<T>, dofs: usize) -> Self {
+        Self {
             inverse,
             dofs,
-            columns: Columns {
-                slots: vec![NONE; stored],
-                stored: (0..foreseen)
-                    .map(|_| Column { values: Vec::with_capacity(dofs), extent: Extent::Near })
-                    .collect(),
-                computed: 0,
-                missing: Vec::with_capacity(stored),
-            },
-            closed: Vec::with_capacity(rows),
-            groups: Groups::with_capacity(rows, keys),
-            roots: Vec::with_capacity(rows),
-            factors: vec![DenseCholesky::with_capacity(rows.min(FORESEEN))],
-            gathered: Vec::with_capacity(rows),
-            products,
+            columns: Columns::default(),
+            closed: Vec::new(),
+            groups: Groups::default(),
+            roots: Vec::new(),
+            factors: Vec::new(),
+            gathered: Vec::new(),
+            products: RowProducts::default(),
             factored: false,
-        })
+        }
     }
 
     /// Discards everything computed from an earlier G.
@@ -170,10 +152,9 @@ impl<T: Real> JumpProjection<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Incompatible`] for a row that G does not have, or, with a consistent mass, a row beyond the number
-    /// given to [`new`](Self::new); [`Error::MissingDof`] for a dof of G that the mass does not have;
-    /// [`Error::ContactNotFinite`] for a row whose S is not a number (`feature` is the row of G). With a consistent
-    /// mass also [`Error::LinearNotConverged`] and [`Error::Singular`], if a solve with M fails.
+    /// [`Error::Incompatible`] for a row that G does not have; [`Error::MissingDof`] for a dof of G that the mass does
+    /// not have; [`Error::ContactNotFinite`] for a row whose S is not a number (`feature` is the row of G). With a
+    /// consistent mass also [`Error::LinearNotConverged`] and [`Error::Singular`], if a solve with M fails.
     pub fn close(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.check_rows(g, rows)?;
         let contact = |feature| ContactId { constraint: 0, feature, candidate: 0 };
@@ -181,18 +162,10 @@ impl<T: Real> JumpProjection<T> {
     }
 
     fn check_rows(&self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
-        let refuse = |reason| Err(Error::Incompatible { part: "the list of closed rows".into(), reason });
-        // A consistent mass stores columns of M⁻¹Gᵀ, one for each announced row.
-        let stored = match self.inverse {
-            InverseMass::Lumped(_) => usize::MAX,
-            InverseMass::Consistent(_) => self.columns.slots.len(),
-        };
         for &row in rows {
             if row >= g.rows() {
-                return refuse("it names a row that G does not have");
-            }
-            if row >= stored {
-                return refuse("it names a row beyond those that were announced");
+                let part = "the list of closed rows".into();
+                return Err(Error::Incompatible { part, reason: "it names a row that G does not have" });
             }
             if let Some((dof, _)) = g.row(row).find(|(dof, _)| *dof >= self.dofs) {
                 return Err(Error::MissingDof { what: "a closed row", dof, dofs: self.dofs });

@@ -74,29 +74,17 @@ impl<T: Real> Switch<T> {
 }
 
 impl<T: Real> Switching<T> {
-    /// Memory for `rows` rows of a system of `dofs` dofs; `None` if no corrector needs it.
-    pub(super) fn new(rows: usize, dofs: Option<usize>) -> Self {
+    /// For a system of `dofs` dofs; `None` if no corrector needs it.
+    pub(super) fn new(dofs: Option<usize>) -> Self {
         let vector = || dofs.map_or(Vec::new(), |dofs| vec![T::zero(); dofs]);
-        let rows = if dofs.is_some() { rows } else { 0 };
         Self {
-            start: dofs.map(|_| [Vec::with_capacity(rows), Vec::with_capacity(rows)]),
-            excess: Vec::with_capacity(rows),
-            rows: Vec::with_capacity(rows),
-            switches: Vec::with_capacity(2 * rows),
+            start: dofs.map(|_| [Vec::new(), Vec::new()]),
+            excess: Vec::new(),
+            rows: Vec::new(),
+            switches: Vec::new(),
             change: vector(),
             momentum: vector(),
         }
-    }
-
-    /// Reserves memory for this many rows.
-    pub(super) fn make_room(&mut self, rows: usize) {
-        let Some(start) = &mut self.start else { return };
-        for values in start {
-            values.reserve(rows.saturating_sub(values.len()));
-        }
-        self.excess.reserve(rows.saturating_sub(self.excess.len()));
-        self.rows.reserve(rows.saturating_sub(self.rows.len()));
-        self.switches.reserve((2 * rows).saturating_sub(self.switches.len()));
     }
 
     /// Whether a corrector needs these data.

@@ -118,7 +118,7 @@ impl<T: Real> Correction<'_, T> {
             return Ok(());
         }
         self.read_rates()?;
-        let mut switching = std::mem::replace(&mut *self.buffers.switching, Switching::new(0, None));
+        let mut switching = std::mem::replace(&mut *self.buffers.switching, Switching::new(None));
         let result = self.return_by_impulses(&mut switching);
         *self.buffers.switching = switching;
         result

@@ -236,7 +236,7 @@ fn step_back<T: Real>(
     if turns {
         find_candidates(run, (&from.motion, step.h), &step.state.contacts.ids)?;
     }
-    let Simulation { parts, compiled, work, constraints, g, .. } = run;
+    let Simulation { parts, compiled, constraints, g, .. } = run;
     let program = starter.as_mut().filter(|_| step.starts).unwrap_or(&mut compiled.program);
     for (place, (stage, record)) in program.stages.iter().zip(&step.stages).enumerate().rev() {
         let mut new = states.remove(0);
@@ -256,8 +256,7 @@ fn step_back<T: Real>(
         back.hold(&mut new);
         let turning = turns.then_some(Turning { constraints: &mut *constraints, g: &mut *g, h: step.h });
         operator.follow(back.follow(&record.forces));
-        let versions = &mut work.contact.rows.problem.versions;
-        let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, turning, back, versions };
+        let mut solved = StageBack { system: &mut *parts.system, operator, stage, record, turning, back };
         solved.undo((&raw, &seeds.impulse), &mut new, states)?;
         back.give([raw, new.u, new.v, new.a]);
     }

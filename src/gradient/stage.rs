@@ -38,8 +38,6 @@ pub(super) struct StageBack<'s, 'a, 'b, T: Real> {
     /// If rows turn.
     pub(super) turning: Option<Turning<'s, 'a, T>>,
     pub(super) back: &'s mut Back<'b, T>,
-    /// The number of Delassus operators so far.
-    pub(super) versions: &'s mut u64,
 }
 
 impl<T: Real> StageBack<'_, '_, '_, T> {
@@ -210,12 +208,12 @@ impl<T: Real> StageBack<'_, '_, '_, T> {
 
     /// Solves (W + c/τ) q = x for closed rows; x becomes q/τ. W is factorized unless it was the last one.
     fn solve_closed(&mut self, rows: &[usize], weights: &[T], solved: &[usize], x: &mut [T]) -> Result<()> {
-        let Self { operator, record, back: Back { factor, factorized, .. }, versions, .. } = self;
+        let Self { operator, record, back: Back { factor, factorized, .. }, .. } = self;
         let compliance = |k: usize| {
             let known = record.held[solved[k]].compliance;
             known.map_or(T::zero(), |known| known.by_force / weights[solved[k]])
         };
-        let (w, version) = operator.delassus(&record.forces, rows, compliance, versions)?;
+        let (w, version) = operator.delassus(&record.forces, rows, compliance)?;
         if *factorized != Some(version) {
             *factorized = None;
             let size = rows.len();
@@ -230,8 +228,8 @@ impl<T: Real> StageBack<'_, '_, '_, T> {
 
     /// Solves for ψ of all rows that carried a force; x becomes Pᵀ ψ.
     fn solve_with_friction(&mut self, rows: &[usize], weights: &[T], x: &mut [T]) -> Result<()> {
-        let Self { operator, record, back, versions, .. } = self;
-        let (w, _) = operator.delassus(&record.forces, rows, |_| T::zero(), versions)?;
+        let Self { operator, record, back, .. } = self;
+        let (w, _) = operator.delassus(&record.forces, rows, |_| T::zero())?;
         let (size, held) = (rows.len(), &record.held);
         let rules: Vec<Rule<T>> = held.iter().map(|held| held.rule).collect();
         let entry = |i: usize, j: usize| weights[i] * w[i * size + j];

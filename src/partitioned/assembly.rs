@@ -2,7 +2,7 @@
 
 use super::coupling::Coupling;
 use super::problem::{FLEXIBILITY, Problem, check_flexibility, check_length};
-use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver};
+use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactSolver, new_version};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::real::Real;
@@ -280,7 +280,8 @@ impl<T: Real> Assembly<T> {
     /// values of each body without contact, `gaps` the gaps at zero values of all bodies, positive when open.
     ///
     /// The multipliers of the previous call are the initial guess; they may change the work, not the result. W is
-    /// formed in the first call, and when a flexibility or the choice of rows has changed. Does not allocate.
+    /// formed in the first call, and when a flexibility or the choice of rows has changed. Allocates only if more rows
+    /// press than ever before.
     ///
     /// # Errors
     ///
@@ -359,7 +360,7 @@ impl<T: Real> Assembly<T> {
                 }
             }
         }
-        problem.version += 1;
+        problem.version = new_version();
         *formed = true;
     }
 

@@ -23,22 +23,19 @@ pub(super) struct Problem<T: Real> {
 }
 
 impl<T: Real> Problem<T> {
-    /// Memory for this many rows; `what` names it if there is not enough.
-    pub(super) fn new(rows: usize, mut solver: Box<dyn ContactSolver<T>>, what: &'static str) -> Result<Self> {
-        // Try to allocate the memory first, including the solver's (its `reserve` cannot fail), so that an absurd
-        // number is an error and not an abort.
-        memory::reserve::<T>(rows, rows.saturating_mul(8), what)?;
-        let delassus = memory::reserve(rows, rows, what)?;
-        solver.reserve(rows);
+    /// For this many rows. `what` names the memory if there is not enough for W and for the solver, which cannot report
+    /// that later.
+    pub(super) fn new(rows: usize, solver: Box<dyn ContactSolver<T>>, what: &'static str) -> Result<Self> {
+        memory::probe::<T>(rows, rows.saturating_mul(8), what)?;
         Ok(Self {
             solver,
-            rows: Vec::with_capacity(rows),
-            multipliers: Vec::with_capacity(rows),
-            delassus,
+            rows: Vec::new(),
+            multipliers: Vec::new(),
+            delassus: memory::reserve(rows, rows, what)?,
             version: 0,
-            offset: Vec::with_capacity(rows),
-            tolerance: Vec::with_capacity(rows),
-            sets: Vec::with_capacity(rows),
+            offset: Vec::new(),
+            tolerance: Vec::new(),
+            sets: Vec::new(),
         })
     }
 

@@ -4,7 +4,7 @@ use super::body::{Boundary, ReducedBody};
 use super::exact_step::ExactStep;
 use crate::contact::{ContactConstraint, LinearRows};
 use crate::contact_id::ContactId;
-use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, contact_error};
+use crate::contact_solver::{ActiveSet, AdmissibleSet, ContactProblem, ContactSolver, contact_error, new_version};
 use crate::dense::{DenseCholesky, dot};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -16,9 +16,6 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 type Load<'a, T> = Box<dyn FnMut(f64, &mut [T]) + Send + 'a>;
-
-/// Version numbers of the two contact matrices, for solvers that reuse data: at the start, and in the steps.
-const VERSIONS: [u64; 2] = [1, 2];
 
 /// Reduced bodies, propagated exactly: within a step every mode follows its equation under a contact force that is
 /// linear in time.
@@ -140,8 +137,9 @@ struct Contact<'a, T: Real> {
     /// G over all dofs.
     entries: Vec<Vec<(usize, T)>>,
     sets: Vec<AdmissibleSet>,
-    /// W of a step.
+    /// W of a step, and its version.
     delassus: Vec<T>,
+    version: u64,
     offset: Vec<T>,
     tolerance: Vec<T>,
     /// Contact forces of the step on all dofs, and a zero displacement for evaluating the gap offsets.
@@ -556,9 +554,8 @@ impl<'a, T: Real> Contact<'a, T> {
         let size = sets.len();
         let (offset, tolerance) = (vec![T::zero(); size], vec![T::zero(); size]);
         let (forces, at_rest) = (vec![T::zero(); dofs], vec![T::zero(); rows.dofs().len()]);
-        let delassus = Vec::new();
-        let mut contact = Self { rows, entries, sets, delassus, offset, tolerance, forces, at_rest, solver };
-        contact.solver.reserve(size);
+        let (delassus, version) = (Vec::new(), new_version());
+        let mut contact = Self { rows, entries, sets, delassus, version, offset, tolerance, forces, at_rest, solver };
         contact.delassus = contact.delassus(bodies, Body::compliance)?;
         Ok(contact)
     }
@@ -610,8 +607,8 @@ impl<'a, T: Real> Contact<'a, T> {
         self.tolerance.iter_mut().for_each(|size| *size = rounding(*size));
         self.offset.copy_from_slice(&motion.gaps);
         let (matrix, version) = match delassus {
-            Some(delassus) => (delassus, VERSIONS[0]),
-            None => (&self.delassus[..], VERSIONS[1]),
+            Some(delassus) => (delassus, 0),
+            None => (&self.delassus[..], self.version),
         };
         let problem = ContactProblem::new(matrix, &self.offset, &self.sets, &self.tolerance)?.with_version(version);
         let id = |feature: usize| ContactId { feature, ..ContactId::default() };

@@ -17,7 +17,7 @@ mod delassus;
 mod products;
 
 use crate::contact::{ContactJacobian, Groups, RowProducts};
-use crate::contact_solver::{Assembly, FORESEEN, Outcome, RowData};
+use crate::contact_solver::{Assembly, Outcome, RowData, new_version};
 use crate::error::{Error, Result};
 use crate::linear_solver::{COLUMNS, Factorization, LinearSolver};
 use crate::mass::Mass;
@@ -62,7 +62,7 @@ pub(crate) struct Operator<T> {
 }
 
 /// The responses of a diagonal matrix.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct DiagonalResponses<T> {
     /// The responses of the interface to unit forces; empty until needed.
     reciprocals: Vec<T>,
@@ -92,24 +92,17 @@ impl<T: Real> Operator<T> {
             _ => Vec::new(),
         };
         let unit = if varies { Unit::Row } else { unit };
-        let mut products = RowProducts::default();
-        if contact == ContactPath::Apart {
-            products.reserve(FORESEEN.min(interface.len()), interface.len());
-        }
         let mut operator = Self {
             matrix,
             part: None,
             factor,
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            diagonal: DiagonalResponses {
-                reciprocals: Vec::with_capacity(if contact == ContactPath::Apart { interface.len() } else { 0 }),
-                products,
-            },
+            diagonal: DiagonalResponses::default(),
             rows: 0,
-            delassus: Delassus::foreseen(interface.len()),
+            delassus: Delassus::default(),
             products: None,
-            groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
+            groups: Groups::default(),
             contact,
             full,
         };
@@ -136,11 +129,11 @@ impl<T: Real> Operator<T> {
             factor: Box::new(factor),
             interface: interface.to_vec(),
             responses: Responses::new(unit, interface.len()),
-            diagonal: DiagonalResponses { reciprocals: Vec::new(), products: RowProducts::default() },
+            diagonal: DiagonalResponses::default(),
             rows: 0,
-            delassus: Delassus::foreseen(interface.len()),
+            delassus: Delassus::default(),
             products: None,
-            groups: Groups::with_capacity(FORESEEN.min(interface.len()), interface.len()),
+            groups: Groups::default(),
             contact: ContactPath::Condensed,
             full: Vec::new(),
         })
@@ -242,7 +235,6 @@ impl<T: Real> Operator<T> {
     }
 
     /// W = G A⁻¹ Gᵀ of some rows, with `compliance(k)` added to the diagonal entry of the k-th, and its version.
-    /// `versions` is the number of versions so far.
     ///
     /// The compliance of a power law at first touch is infinite: a multiple of the diagonal entry of W limits it.
     pub(crate) fn delassus(
@@ -250,7 +242,6 @@ impl<T: Real> Operator<T> {
         g: &ContactJacobian<T>,
         rows: &[usize],
         compliance: impl Fn(usize) -> T,
-        versions: &mut u64,
     ) -> Result<(&[T], u64)> {
         let is_known = self.delassus.version > 0;
         let mut changed = !is_known || self.delassus.rows != rows;
@@ -268,8 +259,7 @@ impl<T: Real> Operator<T> {
             *entry = value;
         }
         if changed {
-            *versions += 1;
-            *version = *versions;
+            *version = new_version();
         }
         Ok((values, *version))
     }
@@ -310,7 +300,8 @@ impl<T: Real> Operator<T> {
         let reciprocals = &mut diagonal.reciprocals;
         if *contact == ContactPath::Apart {
             if reciprocals.is_empty() {
-                reciprocals.resize(interface.len(), T::one());
+                memory::grow(reciprocals, interface.len(), 1, "the responses of the contact rows")?;
+                reciprocals.fill(T::one());
                 let found = respond((*contact, &mut **factor), interface, full, reciprocals);
                 return found.inspect_err(|_| reciprocals.clear());
             }

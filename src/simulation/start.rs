@@ -96,7 +96,7 @@ pub(crate) struct Begun<T: Real> {
     pub(crate) adjustment: Option<StartAdjustment<T>>,
 }
 
-/// M⁻¹ on the free dofs, with memory for the candidates.
+/// M⁻¹ on the free dofs.
 pub(crate) fn projection<T: Real>(
     system: &dyn System<T>,
     constraints: &Constraints<'_, T>,
@@ -107,7 +107,7 @@ pub(crate) fn projection<T: Real>(
         true => InverseMass::new(mass, system.prescribed(), interface)?,
         false => InverseMass::through(solver, mass, system.prescribed())?,
     };
-    JumpProjection::with(inverse, system.dofs(), constraints.room())
+    Ok(JumpProjection::with(inverse, system.dofs()))
 }
 
 impl<T: Real> Start<'_, '_, T> {
@@ -167,7 +167,7 @@ impl<T: Real> Start<'_, '_, T> {
         constraints.check_rows(g, system.prescribed(), motion.t, &motion.u)?;
         RateCheck::new(constraints.len()).check(constraints, motion, *h, g)?;
         projection.reset();
-        let mut contacts = ContactState::with_capacity(constraints.room());
+        let mut contacts = ContactState::default();
         contacts.reset(&constraints.ids, constraints.tangents());
         Ok(contacts)
     }

@@ -55,14 +55,12 @@ impl<T: Real> Simulation<'_, T> {
     /// Searches the contacts of the step and stores their state at its start. From here on the step must be accepted
     /// or undone.
     fn begin_step(&mut self) -> Result<()> {
-        let Self { parts, monitors, constraints, g, state, history, work, scheme, .. } = self;
+        let Self { monitors, constraints, g, state, history, work, scheme, .. } = self;
         history.clock.check()?;
         work.rate_check.version = constraints.version();
         constraints.search_for_step(&state.motion, extent(scheme.ahead(), history), g)?;
-        if constraints.room() > work.rows {
-            work.make_room(constraints.room(), g.entries());
-            state.contacts.make_room(constraints.room());
-            parts.contact_solver.reserve(constraints.room());
+        if g.rows() > work.rows {
+            work.resize(g.rows());
         }
         work.contact.trial.carry_over(&state.contacts, constraints.named(), constraints.tangents());
         constraints.offsets.add_kept(&mut work.contact.trial.gap);

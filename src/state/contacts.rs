@@ -67,35 +67,6 @@ pub struct ContactState<T> {
 }
 
 impl<T: Real> ContactState<T> {
-    pub(crate) fn with_capacity(rows: usize) -> Self {
-        let reals = || Vec::with_capacity(rows);
-        Self {
-            ids: Vec::with_capacity(rows),
-            tangents: Tangents::default(),
-            names: Names::default(),
-            lambda: reals(),
-            lambda_raw: reals(),
-            closed: Vec::with_capacity(rows),
-            gap: reals(),
-            impulse: reals(),
-            lambda_v: reals(),
-            lambda_a: reals(),
-            dissipated: reals(),
-            slip: Vec::new(),
-            sliding: Vec::new(),
-        }
-    }
-
-    /// Reserves memory for this many contacts in total.
-    pub(crate) fn make_room(&mut self, rows: usize) {
-        let Self { ids, lambda, lambda_raw, closed, gap, impulse, lambda_v, lambda_a, dissipated, .. } = self;
-        ids.reserve(rows.saturating_sub(ids.len()));
-        closed.reserve(rows.saturating_sub(closed.len()));
-        for reals in [lambda, lambda_raw, gap, impulse, lambda_v, lambda_a, dissipated] {
-            reals.reserve(rows.saturating_sub(reals.len()));
-        }
-    }
-
     /// Sets the contacts to `ids`, all open.
     pub(crate) fn reset(&mut self, ids: &[ContactId], tangents: &Tangents) {
         let n = ids.len();
@@ -302,7 +273,7 @@ mod tests {
     /// A state whose entries identify their contact: ten times its feature, plus one for the tangent.
     fn filled(features: &[usize], friction: f64) -> ContactState<f64> {
         let (ids, tangents) = named(features, friction);
-        let mut state = ContactState::with_capacity(0);
+        let mut state = ContactState::default();
         state.reset(&ids, &tangents);
         let count = features.len();
         for (k, &feature) in features.iter().enumerate() {

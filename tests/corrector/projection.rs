@@ -20,7 +20,7 @@ fn contacts_with_a_prescribed_dof_in_common() {
             }
             let mut v = [3.0_f64; 3];
             v[plate] = 1.0;
-            let mut projection = JumpProjection::new(Mass::Lumped(&[2.0; 3]), &[plate], g.rows()).unwrap();
+            let mut projection = JumpProjection::new(Mass::Lumped(&[2.0; 3]), &[plate]).unwrap();
             projection.close(&g, &[0, 1]).unwrap();
             let mut impulses = [0.0; 2];
             projection.remove_jump(&g, &[0.0; 2], &mut v, &mut impulses).unwrap();

@@ -229,9 +229,6 @@ fn stages_between_drop_out_of_the_past() {
 struct Heard(ActiveSet, Arc<Mutex<Vec<f64>>>);
 
 impl ContactSolver<f64> for Heard {
-    fn reserve(&mut self, size: usize) {
-        self.0.reserve(size);
-    }
     fn solve(
         &mut self,
         problem: &ContactProblem<'_, f64>,

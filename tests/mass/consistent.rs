@@ -21,7 +21,7 @@ fn number(k: usize) -> f64 {
 
 /// Removes the jumps of some rows from a vector and checks what has become of it. Returns it with the multipliers.
 fn project(m: &Matrix, prescribed: &[usize], g: &ContactJacobian<f64>, rows: &[usize], x: &[f64]) -> [Vec<f64>; 2] {
-    let mut projection = JumpProjection::new(Mass::Consistent(m.as_ref()), prescribed, g.rows()).unwrap();
+    let mut projection = JumpProjection::new(Mass::Consistent(m.as_ref()), prescribed).unwrap();
     let (mut new, mut p) = (x.to_vec(), vec![0.0; rows.len()]);
     let targets: Vec<f64> = (0..rows.len()).map(|k| 0.1 * number(3 * k)).collect();
     projection.close(g, rows).unwrap();
@@ -134,7 +134,7 @@ fn units_make_no_difference() {
             g_own.push(&g.row(row).map(|(dof, weight)| (dof, weight * scale(dof))).collect::<Vec<_>>());
         }
         let x_own: Vec<f64> = x.iter().enumerate().map(|(dof, x)| x / scale(dof)).collect();
-        let mut projection = JumpProjection::new(Mass::Consistent(own.as_ref()), &[], g.rows()).unwrap();
+        let mut projection = JumpProjection::new(Mass::Consistent(own.as_ref()), &[]).unwrap();
         projection.close(&g_own, &rows).unwrap();
         let targets: Vec<f64> = (0..rows.len()).map(|k| 0.1 * number(3 * k)).collect();
         let mut new = x_own;
@@ -149,7 +149,7 @@ fn units_make_no_difference() {
 fn what_is_not_definite_is_refused_at_once() {
     let solid = block([6, 5, 4]);
     let (m, lumped) = (solid.consistent_mass(), solid.lumped_mass::<f64>());
-    let refused = |m: &Matrix| match JumpProjection::new(Mass::Consistent(m.as_ref()), &[], 1) {
+    let refused = |m: &Matrix| match JumpProjection::new(Mass::Consistent(m.as_ref()), &[]) {
         Err(Error::Singular { matrix: "mass matrix", .. }) => true,
         Err(other) => panic!("{other}"),
         Ok(_) => false,

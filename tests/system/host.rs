@@ -150,9 +150,6 @@ struct CountingContact<T: Real> {
 }
 
 impl<T: Real> ContactSolver<T> for CountingContact<T> {
-    fn reserve(&mut self, size: usize) {
-        self.inner.reserve(size);
-    }
     fn solve(
         &mut self,
         problem: &ContactProblem<'_, T>,

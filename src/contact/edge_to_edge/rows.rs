@@ -19,7 +19,7 @@ pub(super) struct Rows<T> {
 
 impl<T: Real> Rows<T> {
     pub(super) fn new() -> Self {
-        Self { affine: AffineRows::with_capacity(0, 0), pairs: Vec::new(), rounding: Vec::new(), crossings: Vec::new() }
+        Self { affine: AffineRows::default(), pairs: Vec::new(), rounding: Vec::new(), crossings: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {

@@ -39,7 +39,7 @@ pub(super) struct Spot {
 impl<T: Real> Rows<T> {
     pub(super) fn new() -> Self {
         Self {
-            affine: AffineRows::with_capacity(0, 0),
+            affine: AffineRows::default(),
             places: Vec::new(),
             spots: Vec::new(),
             tangents: ContactJacobian::default(),

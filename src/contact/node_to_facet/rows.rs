@@ -5,7 +5,7 @@ use crate::contact::surface::{Point, Stand, add_scaled};
 use crate::real::Real;
 
 /// The rows of a search, at their point of linearization.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Rows<T> {
     pub(super) affine: AffineRows<T>,
     /// (node, pass)
@@ -14,14 +14,6 @@ pub(super) struct Rows<T> {
 }
 
 impl<T: Real> Rows<T> {
-    pub(super) fn with_capacity(rows: usize, entries: usize) -> Self {
-        Self {
-            affine: AffineRows::with_capacity(rows, entries),
-            identities: Vec::with_capacity(rows),
-            stands: Vec::with_capacity(rows),
-        }
-    }
-
     pub(super) fn clear(&mut self) {
         self.affine.clear();
         self.identities.clear();

@@ -26,7 +26,7 @@ pub(super) struct Metric<T> {
     pub(super) is_near: bool,
     factor: Option<Box<dyn Factorization<T>>>,
     /// The factor of a few rows, which needs no analysis, and whether it is the present one.
-    dense: Option<DenseCholesky<T>>,
+    dense: DenseCholesky<T>,
     is_dense: bool,
     /// The pattern that the factor was analyzed for, and the values that were factorized.
     analyzed: [Vec<usize>; 2],
@@ -169,7 +169,6 @@ impl<T: Real> Metric<T> {
                 let entries = places[column.clone()].iter().zip(&factorized[column]);
                 entries.take_while(|(j, _)| **j <= i).for_each(|(&j, &value)| row[j] = value);
             };
-            let dense = dense.get_or_insert_with(|| DenseCholesky::with_capacity(FEW));
             return dense.factorize_rows(size, fill).map_err(|dof| Error::Singular { matrix: "rows of contact", dof });
         }
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, starts, None, places);
@@ -296,7 +295,7 @@ impl<T: Real> Metric<T> {
 
     fn solve(&mut self) -> bool {
         let Self { factor, dense, is_dense, right, .. } = self;
-        if let Some(dense) = dense.as_mut().filter(|_| *is_dense) {
+        if *is_dense {
             dense.solve(right);
             return T::all_finite(right);
         }

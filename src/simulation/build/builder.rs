@@ -5,7 +5,7 @@ use crate::analysis;
 #[cfg(doc)]
 use crate::contact::ContactLaw;
 use crate::contact::{ContactConstraint, ContactJacobian};
-use crate::contact_solver::{ActiveSet, ContactSolver, FORESEEN};
+use crate::contact_solver::{ActiveSet, ContactSolver};
 use crate::corrector::Corrector;
 use crate::error::{Error, Result, positive};
 use crate::integrator::TimeIntegrator;
@@ -19,7 +19,7 @@ use crate::simulation::build::pairing::{
 };
 use crate::simulation::build::program::{Compiled, Compiler, Program};
 use crate::simulation::build::scheme::Scheme;
-use crate::simulation::build::workspace::{ContactSize, Workspace};
+use crate::simulation::build::workspace::Workspace;
 use crate::simulation::operator::responses::Unit;
 use crate::simulation::operator::tangent::At;
 use crate::simulation::rows::constraints::Constraints;
@@ -446,9 +446,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
             };
             start.begin(Motion { t, a: vec![T::zero(); dofs], u, v })?
         };
-        let (Begun { state, history, adjustment }, rows) = (begun, constraints.room());
+        let Begun { state, history, adjustment } = begun;
         check_alike(together, ["the number of contact rows"], [constraints.len() as f64])?;
-        contact_solver.reserve(rows.min(FORESEEN));
         let mut correctors = self.correctors;
         if self.corrects_by_default {
             correctors.extend(default_corrections(&scheme.tableau, &constraints, &massless));
@@ -466,8 +465,8 @@ impl<'a, T: Real> SimulationBuilder<'a, T> {
         let startup = (!is_known).then(|| compiler.start(&scheme.derived.starter, &scheme.tableau)).transpose()?;
         let factorizations = program.operators.len() + startup.as_ref().map_or(0, |program| program.operators.len());
         let slots = history.slots.len();
-        let size = ContactSize::new(rows, &g, &constraints);
-        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, &size, slots);
+        let rows = (&constraints, &g);
+        let mut work = Workspace::new(&mut *system, &program, &correctors, projection, rows, slots);
         let follower = follows.then(|| scheme.integrator.name());
         work.keep_massless(massless, (&mut *system, together), (&program, follower), &state.motion, interface)?;
         work.newton = newton(settings.newton, &mut *system, &scheme, &program, &state.motion)?;

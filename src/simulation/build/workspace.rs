@@ -1,5 +1,5 @@
-//! Memory of the steps: nothing in it changes a result. Later allocations are only for more contacts than ever
-//! before.
+//! Memory of the steps: nothing in it changes a result. Lists of contacts grow in steps that have more of them than
+//! ever before.
 
 use crate::contact::ContactJacobian;
 use crate::corrector::{Backup, Buffers, Corrector, Edits, Effects, JumpProjection};
@@ -38,7 +38,7 @@ pub(crate) struct Workspace<T: Real> {
     pub(crate) rate_check: RateCheck<T>,
     /// For schemes with a stability limit that may be reached in the run.
     pub(crate) stiffening: Option<Stiffening<T>>,
-    /// Number of contacts to reserve memory for.
+    /// The largest number of rows so far.
     pub(crate) rows: usize,
     /// v and a at the time of the new state, if the scheme stores them at another time.
     pub(crate) rates: [Vec<T>; 2],
@@ -57,25 +57,6 @@ pub(crate) struct CorrectionWork<T: Real> {
     pub(crate) energy: T,
 }
 
-/// The amount of contact to reserve memory for.
-pub(crate) struct ContactSize {
-    /// Number of rows to reserve memory for, and number of weights of all rows.
-    pub(crate) rows: usize,
-    pub(crate) entries: usize,
-    /// Dofs that contact may ever act on.
-    pub(crate) interface: usize,
-    /// Whether there may ever be a row.
-    pub(crate) may_press: bool,
-}
-
-impl ContactSize {
-    /// Sizes of the constraints, with memory for `rows` rows.
-    pub(crate) fn new<T: Real>(rows: usize, g: &ContactJacobian<T>, constraints: &Constraints<'_, T>) -> Self {
-        let (entries, interface) = (g.entries(), constraints.interface().len());
-        Self { rows, entries, interface, may_press: constraints.may_press() }
-    }
-}
-
 impl<T: Real> Workspace<T> {
     /// Memory for the steps of a program, with a history of `slots` motions.
     pub(crate) fn new(
@@ -83,11 +64,11 @@ impl<T: Real> Workspace<T> {
         program: &Program<T>,
         correctors: &[Box<dyn Corrector<T> + '_>],
         projection: JumpProjection<T>,
-        contact: &ContactSize,
+        (constraints, g): (&Constraints<'_, T>, &ContactJacobian<T>),
         slots: usize,
     ) -> Self {
         let dofs = system.dofs();
-        let &ContactSize { rows, entries, interface, may_press } = contact;
+        let (rows, may_press) = (g.rows(), constraints.may_press());
         let damped = if system.damping_force().is_some() && !correctors.is_empty() { dofs } else { 0 };
         let effects = Effects::of_all(correctors);
         let balances = may_press && effects.corrects_massless;
@@ -96,19 +77,19 @@ impl<T: Real> Workspace<T> {
         let (aimed, forecast) = (targets.clone().count() > 0, targets.any(|target| target.forecast.is_some()));
         let separate_balance = program.stages.iter().any(|stage| stage.balance.is_some());
         let supports = Supports::of(system);
-        let mut contact_rows = ContactRowsWork::new([rows, entries], room(aimed), room(forecast), supports.dofs.len());
+        let mut contact_rows = ContactRowsWork::new(rows, room(aimed), room(forecast), supports.dofs.len());
         contact_rows.slips.by_displacement = effects.leaves_smooth_motion;
         Self {
             contact: ContactWork {
-                interface: InterfaceWork::new(interface),
+                interface: InterfaceWork::new(constraints.interface().len()),
                 rows: contact_rows,
-                trial: ContactState::with_capacity(rows),
+                trial: ContactState::default(),
                 impulses: Impulses::new(room(true)),
-                closed_at_start: Vec::with_capacity(rows),
-                exerting_at_start: Vec::with_capacity(rows),
+                closed_at_start: Vec::new(),
+                exerting_at_start: Vec::new(),
                 forces_at_start: Vec::new(),
                 sliding_at_start: Vec::new(),
-                was_closed: Vec::with_capacity(rows),
+                was_closed: Vec::new(),
                 was_sticking: Vec::new(),
             },
             vectors: StageVectors {
@@ -148,9 +129,8 @@ impl<T: Real> Workspace<T> {
     ) -> Result<()> {
         if let Some(name) = follower {
             self.block = Some(MasslessBlock::new(system, &name, &massless, at, interface)?);
-            self.contact.rows.massless.acts = vec![false; self.rows];
         } else if self.correction.buffers.switching.is_on() && self.correction.buffers.shifted.is_empty() {
-            self.excess = ExcessForces::new(system, program, &massless, at, (interface, self.rows))?;
+            self.excess = ExcessForces::new(system, program, &massless, at, interface)?;
         }
         let buffers = &mut self.correction.buffers;
         if buffers.spreads() && !(massless.is_empty() && together.is_alone()) {
@@ -167,19 +147,11 @@ impl<T: Real> Workspace<T> {
         Ok(())
     }
 
-    /// Memory for `rows` contacts with `entries` weights in all.
-    pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
+    /// Lists with an entry for each of so many rows.
+    pub(crate) fn resize(&mut self, rows: usize) {
         self.rows = rows;
-        self.contact.rows.make_room(rows, entries);
-        self.contact.trial.make_room(rows);
-        let ContactWork { closed_at_start, exerting_at_start, was_closed, .. } = &mut self.contact;
-        for flags in [closed_at_start, exerting_at_start, was_closed] {
-            flags.reserve(rows.saturating_sub(flags.len()));
-        }
-        self.correction.buffers.make_room(rows);
-        if let Some(excess) = &mut self.excess {
-            excess.make_room(rows);
-        }
-        self.rate_check.make_room(rows);
+        self.contact.rows.resize(rows);
+        self.correction.buffers.resize(rows);
+        self.rate_check.resize(rows);
     }
 }

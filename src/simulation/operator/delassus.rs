@@ -1,13 +1,12 @@
 //! The Delassus operator of the active rows. When rows join or leave, the couplings of the others are moved and not
 //! formed again: they stay the same to the bit.
 
-use crate::contact_solver::FORESEEN;
 use crate::error::Result;
 use crate::memory;
 use crate::real::Real;
 
 /// W of some rows, kept until they or their responses change. It grows with them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Delassus<T> {
     pub(crate) rows: Vec<usize>,
     /// Row by row, with the compliances of the laws on the diagonal.
@@ -36,20 +35,6 @@ struct Run {
 const WHAT: &str = "the Delassus operator";
 
 impl<T: Real> Delassus<T> {
-    /// Memory for the number of rows expected on an interface of `interface` dofs.
-    pub(crate) fn foreseen(interface: usize) -> Self {
-        let rows = interface.min(FORESEEN);
-        Self {
-            rows: Vec::with_capacity(rows),
-            values: Vec::with_capacity(rows * rows),
-            diagonal: Vec::with_capacity(rows),
-            roots: Vec::with_capacity(rows),
-            version: 0,
-            joined: Vec::with_capacity(rows),
-            runs: Vec::with_capacity(rows),
-        }
-    }
-
     /// Memory for W of some rows, all of which have joined.
     pub(crate) fn begin(&mut self, rows: &[usize]) -> Result<()> {
         self.values.clear();
@@ -133,9 +118,7 @@ impl<T: Real> Delassus<T> {
     fn compare(&mut self, rows: &[usize]) -> bool {
         let Self { rows: before, runs, joined, .. } = self;
         runs.clear();
-        runs.reserve(rows.len());
         joined.clear();
-        joined.reserve(rows.len());
         let (mut among, mut next) = (0, 0);
         for (now, &row) in rows.iter().enumerate() {
             let Some(ahead) = before[next..].iter().position(|other| *other == row) else {
@@ -180,7 +163,7 @@ mod tests {
 
     #[test]
     fn rows_come_and_go() {
-        let mut w = Delassus::foreseen(0);
+        let mut w = Delassus::default();
         let all: Vec<usize> = (0..40).collect();
         let sets = |mask: usize| all.iter().copied().filter(move |row| (row * row + mask * 7) % (2 + mask % 5) != 1);
         let mut list: Vec<Vec<usize>> = (0..30).map(|mask| sets(mask * mask).collect()).collect();
@@ -230,7 +213,7 @@ mod tests {
             };
             let all: Vec<usize> = (0..n).collect();
             let few: Vec<usize> = (0..n).filter(|i| i % 3 > 0).collect();
-            let mut w = Delassus::foreseen(0);
+            let mut w = Delassus::default();
             for rows in [&all, &few, &all] {
                 w.rearrange(rows).unwrap();
                 fill(&mut w, rows);

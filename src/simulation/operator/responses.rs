@@ -60,9 +60,6 @@ struct Column {
     count: usize,
 }
 
-/// Number of dofs of an interface whose responses take little memory altogether.
-const SMALL: usize = 256;
-
 /// Mean number of entries of a row up to which whole responses to rows are formed, as for nodes on obstacles.
 const SHORT: usize = 8;
 
@@ -73,20 +70,19 @@ const NONE: usize = usize::MAX;
 const MISSING: usize = usize::MAX - 1;
 
 impl<T: Real> Responses<T> {
-    /// For an interface of `size` dofs. All columns of a small one have memory at once.
+    /// For an interface of `size` dofs.
     pub(crate) fn new(unit: Unit, size: usize) -> Self {
-        let small = if size <= SMALL { size } else { 0 };
         Self {
             unit,
             size,
-            slots: Vec::with_capacity(small),
-            columns: Vec::with_capacity(small),
-            pages: (0..small.div_ceil(COLUMNS)).map(|_| Vec::with_capacity(COLUMNS * size)).collect(),
+            slots: Vec::new(),
+            columns: Vec::new(),
+            pages: Vec::new(),
             page: 0,
-            solved: Vec::with_capacity(COLUMNS * small),
-            missing: Vec::with_capacity(small),
-            whole: Vec::with_capacity(size),
-            tiles: Tiles::for_interface(small),
+            solved: Vec::new(),
+            missing: Vec::new(),
+            whole: Vec::new(),
+            tiles: Tiles::default(),
         }
     }
 

@@ -25,8 +25,6 @@ pub(crate) struct Constraints<'a, T: Real> {
     interface: Interface,
     law_support: LawSupport,
     pub(crate) reading: Reading,
-    /// Number of rows to reserve memory for.
-    room: usize,
     /// Time by which the last search looked ahead.
     pub(crate) ahead: f64,
     pub(crate) scratch: Scratch<T>,
@@ -52,6 +50,7 @@ pub(crate) struct Reading {
 }
 
 /// Memory for the evaluation of constraints.
+#[derive(Default)]
 pub(crate) struct Scratch<T> {
     /// Rows and rates of a constraint that is evaluated at another motion.
     pub(crate) contacts: Contacts<T>,
@@ -90,9 +89,8 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         let mut places = vec![UNKNOWN; dofs];
         let (mut seen, mut local) = (vec![usize::MAX; dofs], Local::default());
-        let (mut own, mut interface, mut room) = (Vec::with_capacity(parts.len()), Vec::new(), 0);
+        let (mut own, mut interface) = (Vec::with_capacity(parts.len()), Vec::new());
         let mut features = Vec::new();
-        let mut scratch = Contacts::new();
         for (number, mut constraint) in parts.into_iter().enumerate() {
             let list = constraint.dofs().to_vec();
             for &dof in &list {
@@ -105,23 +103,17 @@ impl<'a, T: Real> Constraints<'a, T> {
                 }
             }
             let (u, v) = (gather(&list, u, &mut local.u), gather(&list, v, &mut local.v));
-            local.other.reserve(list.len());
             list_features(number, broken, &mut features);
             constraint.set_broken(&features);
             constraint.search(t, u, v, 0.0).map_err(|error| of(number, error))?;
             interface.extend((0..list.len()).filter(|&place| !constraint.only_reads(place)).map(|place| list[place]));
-            let contacts = Contacts::of(&constraint);
-            // Reserves memory for the largest constraint.
-            scratch.clear();
-            constraint.contacts(&mut scratch);
-            room += contacts.len() + contacts.friction_rows();
             own.push(Part {
                 variation: constraint.variation(),
                 inspects: constraint.inspects(),
                 place: (t, u.to_vec()),
+                contacts: Contacts::of(&constraint),
                 constraint,
                 dofs: list,
-                contacts,
                 stale: true,
                 version: 0,
                 rates: None,
@@ -139,32 +131,18 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         let constraints = Self {
             parts: own,
-            ids: Vec::with_capacity(room),
-            laws: Laws::with_capacity(room),
+            ids: Vec::new(),
+            laws: Laws::default(),
             tangents: Tangents::default(),
-            magnitudes: Vec::with_capacity(room),
-            offsets: GapOffsets::with_capacity(room),
+            magnitudes: Vec::new(),
+            offsets: GapOffsets::default(),
             interface: Interface { dofs: interface, places },
             law_support,
             reading: Reading { stale: true, version: 0, names: Names::default(), old_tangents: Tangents::default() },
-            room,
             ahead: 0.0,
-            scratch: Scratch {
-                contacts: scratch,
-                rates: vec![GapRates::default(); room],
-                slip_rates: Vec::new(),
-                local,
-                differences: RateDifferences::default(),
-                overloads: Vec::new(),
-                features,
-            },
+            scratch: Scratch { local, features, ..Scratch::default() },
         };
         Ok((constraints, ContactJacobian::default()))
-    }
-
-    /// Number of rows to reserve memory for: at least the largest number so far. It grows by doubling.
-    pub(crate) fn room(&self) -> usize {
-        self.room
     }
 
     /// Whether any constraint may ever have rows.
@@ -226,7 +204,6 @@ impl<'a, T: Real> Constraints<'a, T> {
             return Ok(());
         }
         let mut kept = std::mem::take(&mut self.offsets.kept);
-        kept.reserve(self.room());
         kept.resize(self.len(), T::zero());
         let evaluated = self.finite_gaps(motion.t, &motion.u, &mut kept);
         for (kept, &recovery) in kept.iter_mut().zip(&self.offsets.recoveries) {
@@ -381,9 +358,6 @@ impl<'a, T: Real> Constraints<'a, T> {
         }
         self.reading.stale = false;
         self.reading.version += 1;
-        if jacobian.rows() > self.room {
-            self.room = jacobian.rows().max(2 * self.room);
-        }
         self.offsets.distribute(&self.ids);
         Ok(())
     }

@@ -60,6 +60,7 @@ impl RowState {
 }
 
 /// Compliant laws, linearized: 0 ≤ y + compliance λ + shift ⊥ λ ≥ 0.
+#[derive(Default)]
 pub(crate) struct LawRows<T> {
     pub(crate) compliance: Vec<T>,
     pub(crate) shift: Vec<T>,
@@ -70,6 +71,7 @@ pub(crate) struct LawRows<T> {
 }
 
 /// Rows whose law reads the gap at the start of the stage, or whose rate is constrained.
+#[derive(Default)]
 pub(crate) struct StartRows<T> {
     /// The quantity that each row constrains in this stage.
     pub(crate) measure: Vec<Measure>,
@@ -112,16 +114,16 @@ impl<T: Real> LawRows<T> {
 }
 
 impl<T: Real> ContactRowsWork<T> {
-    /// Buffers for `rows` contacts with `entries` weights, and for targets of `target_dofs` and forecasts of
-    /// `forecast_dofs` dofs (0 if the scheme has none) with `supports` prescribed dofs.
-    pub(crate) fn new([rows, entries]: [usize; 2], target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
+    /// Buffers for `rows` rows, and for targets of `target_dofs` and forecasts of `forecast_dofs` dofs (0 if the scheme
+    /// has none) with `supports` prescribed dofs.
+    pub(crate) fn new(rows: usize, target_dofs: usize, forecast_dofs: usize, supports: usize) -> Self {
         let mut work = Self {
             y: Vec::new(),
             tolerance: Vec::new(),
             weight: Vec::new(),
             state: Vec::new(),
-            laws: LawRows { compliance: Vec::new(), shift: Vec::new(), balance_gap: Vec::new(), approach: Vec::new() },
-            start: StartRows { measure: Vec::new(), gap: Vec::new(), tolerance: Vec::new(), closed_slack: Vec::new() },
+            laws: LawRows::default(),
+            start: StartRows::default(),
             target: TargetWork {
                 values: vec![T::zero(); target_dofs],
                 forecast: vec![T::zero(); forecast_dofs],
@@ -129,16 +131,16 @@ impl<T: Real> ContactRowsWork<T> {
             },
             massless: MasslessRows::new(),
             curved: CurvedRowsWork::new(),
-            problem: ProblemRows::new(rows),
+            problem: ProblemRows::default(),
             rates: Vec::new(),
             slips: Slips { rates: Vec::new(), by_displacement: false },
         };
-        work.make_room(rows, entries);
+        work.resize(rows);
         work
     }
 
-    /// Memory for `rows` rows with `entries` weights.
-    pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
+    /// Lists with an entry for each of so many rows.
+    pub(crate) fn resize(&mut self, rows: usize) {
         let Self { y, tolerance, weight, laws, start, .. } = self;
         let LawRows { compliance, shift, balance_gap, approach } = laws;
         for values in [y, tolerance, weight, compliance, shift, balance_gap, approach] {
@@ -150,14 +152,9 @@ impl<T: Real> ContactRowsWork<T> {
         start.measure.resize(rows, Measure::AsScheme);
         self.state.resize(rows, RowState::Open);
         self.rates.resize(rows, GapRates::default());
-        if !self.slips.rates.is_empty() {
-            self.slips.rates.resize(rows, GapRates::default());
-        }
-        if !self.massless.acts.is_empty() {
-            self.massless.acts.resize(rows, false);
-        }
-        self.curved.make_room(rows, entries);
-        self.problem.make_room(rows);
+        self.massless.acts.resize(rows, false);
+        self.curved.gaps.resize(rows, T::zero());
+        self.curved.predicted.resize(rows, T::zero());
     }
 
     /// Evaluates the gaps at the start of a stage, if a law reads them. The rows are still linearized there.

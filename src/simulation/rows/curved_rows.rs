@@ -117,15 +117,6 @@ impl<T: Real> CurvedRowsWork<T> {
         (self.residual, self.is_exact) = (residual, true);
     }
 
-    /// Memory for `rows` rows with `entries` weights.
-    pub(crate) fn make_room(&mut self, rows: usize, entries: usize) {
-        self.gaps.resize(rows, T::zero());
-        self.predicted.resize(rows, T::zero());
-        if self.rows.rows() == 0 {
-            self.rows = ContactJacobian::with_capacity(rows, entries);
-        }
-    }
-
     /// Begins a stage: F is G.
     pub(crate) fn forget(&mut self) {
         self.apart = false;

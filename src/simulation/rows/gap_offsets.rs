@@ -18,11 +18,6 @@ pub(crate) struct GapOffsets<T> {
 }
 
 impl<T: Real> GapOffsets<T> {
-    /// Memory for `rows` rows.
-    pub(crate) fn with_capacity(rows: usize) -> Self {
-        Self { overclosures: None, depths: Vec::new(), recoveries: Vec::with_capacity(rows), kept: Vec::new() }
-    }
-
     /// Forgets all rows.
     pub(crate) fn clear_rows(&mut self) {
         self.recoveries.clear();

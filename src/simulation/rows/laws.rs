@@ -24,11 +24,6 @@ pub(crate) struct Laws {
 }
 
 impl Laws {
-    /// Memory for `rows` rows.
-    pub(crate) fn with_capacity(rows: usize) -> Self {
-        Self { list: Vec::with_capacity(rows), ..Self::default() }
-    }
-
     /// Forgets all rows.
     pub(crate) fn clear(&mut self) {
         *self = Self { list: std::mem::take(&mut self.list), ..Self::default() };

@@ -1,9 +1,10 @@
 //! The contact problem of a stage: its rows, and its data with one entry per row of it.
 
-use crate::contact_solver::{AdmissibleSet, ContactProblem, FORESEEN};
+use crate::contact_solver::{AdmissibleSet, ContactProblem};
 use crate::real::Real;
 
 /// The contact problem of a stage.
+#[derive(Default)]
 pub(crate) struct ProblemRows<T> {
     /// Its rows, group by group.
     pub(crate) rows: Vec<usize>,
@@ -16,44 +17,12 @@ pub(crate) struct ProblemRows<T> {
     /// Compliances of the rows, if W is not formed.
     pub(crate) own: Vec<T>,
     pub(crate) known: KnownForces<T>,
-    /// Number of rows for which the contact solver has reserved memory.
-    pub(crate) reserved: usize,
-    /// Number of rows for which the available memory has been checked; small problems are not checked.
+    /// Number of rows for which the available memory has been checked.
     pub(crate) checked: usize,
-    /// Number of Delassus operators assembled so far: the newest version.
-    pub(crate) versions: u64,
-}
-
-impl<T: Real> ProblemRows<T> {
-    /// Memory for the problems of `rows` candidates; rows follow by [`make_room`](Self::make_room).
-    pub(crate) fn new(rows: usize) -> Self {
-        Self {
-            rows: Vec::new(),
-            sorted: Vec::new(),
-            offset: Vec::new(),
-            tolerance: Vec::new(),
-            sets: Vec::new(),
-            multipliers: Vec::new(),
-            own: Vec::new(),
-            known: KnownForces { delassus: Vec::new(), offset: Vec::new() },
-            reserved: rows.min(FORESEEN),
-            checked: FORESEEN,
-            versions: 0,
-        }
-    }
-
-    /// Memory for `rows` rows.
-    pub(crate) fn make_room(&mut self, rows: usize) {
-        self.rows.reserve(rows);
-        self.sorted.reserve(rows);
-        self.sets.reserve(rows);
-        for values in [&mut self.offset, &mut self.tolerance, &mut self.multipliers] {
-            values.reserve(rows);
-        }
-    }
 }
 
 /// A contact problem in which some normal multipliers are known: their rows are the uncoupled equations λ = force.
+#[derive(Default)]
 pub(crate) struct KnownForces<T> {
     delassus: Vec<T>,
     offset: Vec<T>,
@@ -68,6 +37,7 @@ impl<T: Real> KnownForces<T> {
     ) -> ContactProblem<'p, T> {
         let (Self { delassus, offset }, size) = (self, problem.size());
         delassus.clear();
+        delassus.reserve_exact(size * size);
         offset.clear();
         // The diagonal of an uncoupled row is arbitrary, and forces of a static balance are in another unit than W:
         // the largest of the other diagonals is used.

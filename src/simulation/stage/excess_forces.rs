@@ -60,14 +60,14 @@ fn is_trapezoidal<T: Real>(stage: &CompiledStage<T>) -> bool {
 }
 
 impl<T: Real> ExcessForces<T> {
-    /// For a linear system, its dofs without mass, and `rows` contacts. None if there are no such dofs or their
+    /// For a linear system and its dofs without mass. None if there are no such dofs or their
     /// stiffness alone does not hold them, and for schemes whose forces are not the forces of the state.
     pub(crate) fn new(
         system: &mut dyn System<T>,
         program: &Program<T>,
         massless: &[usize],
         at: &Motion<T>,
-        (interface, rows): (&[usize], usize),
+        interface: &[usize],
     ) -> Result<Option<Box<Self>>> {
         // Between stages only a change of the acceleration at the start of the first stage is passed on.
         let is_alone = program.stages.len() == 1;
@@ -87,8 +87,8 @@ impl<T: Real> ExcessForces<T> {
         let vector = || vec![T::zero(); dofs];
         Ok(Some(Box::new(Self {
             statics,
-            gaps: Vec::with_capacity(rows),
-            misses: Vec::with_capacity(rows),
+            gaps: Vec::new(),
+            misses: Vec::new(),
             way: vector(),
             followed: vector(),
             forces: vector(),
@@ -98,13 +98,6 @@ impl<T: Real> ExcessForces<T> {
             is_carried: false,
             impulse_weight: T::of(last.covector[0][1]),
         })))
-    }
-
-    /// Memory for `rows` rows.
-    pub(crate) fn make_room(&mut self, rows: usize) {
-        for values in [&mut self.gaps, &mut self.misses] {
-            values.reserve(rows.saturating_sub(values.len()));
-        }
     }
 
     /// Begins a stage, the first of its step or a later one, which takes over the change of the stage before.

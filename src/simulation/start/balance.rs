@@ -329,7 +329,7 @@ impl<T: Real> Start<'_, '_, T> {
         let Self { constraints, g, contact_solver, .. } = self;
         let free: Vec<T> =
             level.free.iter().enumerate().map(|(row, y)| *y + g.interface_product(row, on_interface)).collect();
-        let (mut contacts, mut rows, mut versions) = (Vec::new(), Vec::new(), 0);
+        let (mut contacts, mut rows) = (Vec::new(), Vec::new());
         let (mut lambda, mut response) = (Vec::new(), vec![T::zero(); on_interface.len()]);
         loop {
             let is_pressed = |&row: &usize| {
@@ -354,11 +354,10 @@ impl<T: Real> Start<'_, '_, T> {
             }
             let [offset, tolerance] =
                 [&free, &level.tolerance].map(|values| rows.iter().map(|&row| values[row]).collect::<Vec<T>>());
-            let (delassus, version) = operator.delassus(g, &rows, |k| level.compliance[rows[k]], &mut versions)?;
+            let (delassus, version) = operator.delassus(g, &rows, |k| level.compliance[rows[k]])?;
             let problem = ContactProblem::of(delassus, &offset, &sets, &tolerance, version);
             lambda.clear();
             lambda.resize(rows.len(), T::zero());
-            contact_solver.reserve(rows.len());
             let solved = contact_solver.solve(&problem, &mut lambda);
             solved.map_err(|failure| contact_error(t, failure, |i| constraints.id_of(rows[i])))?;
             operator.answer(g, (&rows, &lambda), at_contacts, &mut response);

@@ -283,7 +283,6 @@ impl<T: Real> StartProblem<T> {
             }
         }
         let Start { constraints, g, projection, contact_solver, .. } = start;
-        contact_solver.reserve(problem.rows.len());
         problem.solve((g, projection), &mut **contact_solver, FrictionOf::Pressing, (t, |row| constraints.ids[row]))?;
         let is_unknown = |row: usize| self.known.iter().all(|(known, _)| *known != row);
         let unknown = problem.rows.iter().zip(&problem.totals).filter(|(row, _)| is_unknown(**row));
@@ -320,7 +319,6 @@ impl<T: Real> StartProblem<T> {
         }
         let Start { constraints, g, projection, contact_solver, .. } = start;
         let tangents = constraints.tangents();
-        contact_solver.reserve(problem.rows.len());
         let id = |row| constraints.ids[tangents.owner(row)];
         if problem.solve((g, projection), &mut **contact_solver, FrictionOf::Pressing, (motion.t, id)).is_err() {
             return Ok(None);

@@ -25,12 +25,12 @@ impl<T: Real> RateCheck<T> {
     /// Memory for `rows` rows.
     pub(crate) fn new(rows: usize) -> Self {
         let mut check = Self { before: Vec::new(), now: Vec::new(), rates: Vec::new(), silent: Vec::new(), version: 0 };
-        check.make_room(rows);
+        check.resize(rows);
         check
     }
 
     /// Memory for `rows` rows.
-    pub(crate) fn make_room(&mut self, rows: usize) {
+    pub(crate) fn resize(&mut self, rows: usize) {
         self.before.resize(rows, T::zero());
         self.now.resize(rows, T::zero());
         self.rates.resize(rows, GapRates::default());

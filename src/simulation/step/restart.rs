@@ -1,6 +1,5 @@
 //! Restarts after a discontinuity that the host knows.
 
-use crate::contact_solver::FORESEEN;
 use crate::corrector::Corrector;
 use crate::error::Result;
 use crate::real::Real;
@@ -63,8 +62,6 @@ impl<T: Real> Simulation<'_, T> {
             constraints.search(&state.motion, scheme.ahead() * h, g).ok();
         }
         let Begun { state: mut begun, history: mut past, .. } = started?;
-        work.contact.rows.problem.reserved = constraints.room().min(FORESEEN);
-        contact_solver.reserve(work.contact.rows.problem.reserved);
         let is_known = past.known == scheme.depth;
         let starter = (!is_known && self.compiled.startup.is_none())
             .then(|| self.compiled_starter(h, &begun.motion))

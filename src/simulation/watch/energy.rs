@@ -117,7 +117,7 @@ impl<T: Real> Ledger<T> {
             is_supported: supports_of_all > 0.0,
             before: Forces::new(dofs, supports),
             after: Forces::new(dofs, supports),
-            impacts: Impacts::new(projection, rows.0.room()),
+            impacts: Impacts::new(projection),
             row_forces: Vec::new(),
             next_works: Works::default(),
         };

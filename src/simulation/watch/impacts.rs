@@ -40,10 +40,9 @@ pub(crate) struct Hidden<T> {
 }
 
 impl<T: Real> Impacts<T> {
-    /// Memory for `rows` rows.
-    pub(crate) fn new(projection: JumpProjection<T>, rows: usize) -> Self {
-        let [gaps, rates, forces, changes, sums] = [(); 5].map(|()| Vec::with_capacity(rows));
-        Self { projection, version: 0, gaps, rates, forces, own: Vec::with_capacity(rows), changes, sums }
+    pub(crate) fn new(projection: JumpProjection<T>) -> Self {
+        let [gaps, rates, forces, changes, sums] = [(); 5].map(|()| Vec::new());
+        Self { projection, version: 0, gaps, rates, forces, own: Vec::new(), changes, sums }
     }
 
     /// Evaluates the contacts of the state that a step starts from; `forces` are the forces of its rows.

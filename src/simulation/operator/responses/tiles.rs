@@ -25,17 +25,6 @@ pub(crate) struct Tiles<T> {
 }
 
 impl<T: Real> Tiles<T> {
-    /// With memory for all rows of a small interface.
-    pub(crate) fn for_interface(size: usize) -> Self {
-        Self {
-            entries: Vec::with_capacity(size * size),
-            starts: Vec::with_capacity(size + 1),
-            next: Vec::with_capacity(size),
-            own: Vec::with_capacity(FEW * TILE.min(size)),
-            all: Vec::with_capacity(size * TILE.min(size)),
-        }
-    }
-
     /// W of some rows, row by row, on an interface of `size` places; `column` returns the response to a unit force at
     /// any place that the rows act on.
     pub(crate) fn couple<'c>(
@@ -120,7 +109,7 @@ mod tests {
     #[test]
     fn tiles_add_up_to_the_whole() {
         let noise = |i: usize, j: usize| ((i * 37 + j * 101) as f64).sin();
-        let mut tiles = Tiles::for_interface(0);
+        let mut tiles = Tiles::default();
         for size in [5, TILE, 3 * TILE + 7] {
             let columns: Vec<Vec<f64>> =
                 (0..size).map(|j| (0..size).map(|i| noise(i.min(j), i.max(j))).collect()).collect();

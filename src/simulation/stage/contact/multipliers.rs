@@ -176,7 +176,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
         let mut first_set = 0;
         for group in 0..self.operator.groups().len() {
             let range = self.operator.groups().range(group);
-            self.reserve_solver(range.len())?;
+            self.check_memory(range.len())?;
             let Self { constraints, g, operator, solver, contact, new, .. } = &mut *self;
             let ContactWork { rows, trial, .. } = &mut **contact;
             let ContactRowsWork { laws, weight, curved, problem, .. } = rows;
@@ -187,7 +187,7 @@ impl<T: Real> StageSolve<'_, '_, T> {
                 true => T::zero(),
                 false => laws.compliance[own[k]] / weight[own[k]],
             };
-            let (delassus, version) = operator.delassus(forces, own, compliance, &mut problem.versions)?;
+            let (delassus, version) = operator.delassus(forces, own, compliance)?;
             // A contact with friction is one block of several rows.
             let blocks = own.iter().filter(|&&row| !forces.is_tangential(row)).count();
             let sets = &problem.sets[first_set..first_set + blocks];
@@ -215,19 +215,15 @@ impl<T: Real> StageSolve<'_, '_, T> {
         Ok(iterations)
     }
 
-    /// Memory of the contact solver for a group of `rows` rows. It needs two matrices as large as W, and cannot report
-    /// missing memory: this is checked before.
-    fn reserve_solver(&mut self, rows: usize) -> Result<()> {
-        let problem = &mut self.contact.rows.problem;
-        if rows <= problem.checked {
-            return Ok(());
-        }
-        let room = if rows > problem.reserved { rows.next_power_of_two() } else { rows };
-        memory::probe::<T>(room, 3 * room, "the contact solver")?;
-        problem.checked = room;
-        if room > problem.reserved {
-            problem.reserved = room;
-            self.solver.reserve(room);
+    /// Checks that there is memory for the contact solver, which cannot report that there is none: for a group of
+    /// `rows` rows it needs two matrices as large as W.
+    fn check_memory(&mut self, rows: usize) -> Result<()> {
+        /// Up to so many rows it is not checked.
+        const FEW: usize = 128;
+        let checked = &mut self.contact.rows.problem.checked;
+        if rows > FEW.max(*checked) {
+            memory::probe::<T>(rows, 3 * rows, "the contact solver")?;
+            *checked = rows;
         }
         Ok(())
     }
