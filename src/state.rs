@@ -36,13 +36,9 @@ use crate::real::Real;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: Real"))]
 pub(crate) struct Motion<T> {
-    #[cfg_attr(feature = "serde", serde(rename = "time"))]
     pub(crate) t: f64,
-    #[cfg_attr(feature = "serde", serde(rename = "displacement"))]
     pub(crate) u: Vec<T>,
-    #[cfg_attr(feature = "serde", serde(rename = "velocity"))]
     pub(crate) v: Vec<T>,
-    #[cfg_attr(feature = "serde", serde(rename = "acceleration"))]
     pub(crate) a: Vec<T>,
 }
 
@@ -145,6 +141,12 @@ impl<T: Real> State<T> {
     /// Accelerations as the scheme stores them, at the time defined by its rows; they satisfy its balance.
     pub fn stored_acceleration(&self) -> &[T] {
         &self.motion.a
+    }
+
+    /// Whether the scheme stores v or a at another time than the time of the state.
+    #[cfg(feature = "serde")]
+    fn is_shifted(&self) -> bool {
+        self.rates.iter().any(|rate| !rate.is_empty())
     }
 
     /// Contacts, one entry per candidate.

@@ -505,7 +505,7 @@ fn other_files_and_formats_are_refused_in_words() {
     let [files, _] = samples();
     let read = |text: &str| serde_json::from_str::<Checkpoint<f64>>(text).unwrap_err().to_string();
     for (written, words) in [
-        (files.text.replace("checkpoint 5", "checkpoint 7"), ["format 7", "reads format 5"]),
+        (files.text.replace("checkpoint 6", "checkpoint 7"), ["format 7", "reads format 6"]),
         (files.text.replace("contact-dynamics checkpoint", "results"), ["no checkpoint", "contact-dynamics"]),
         (files.text.replace("\"f64\"", "\"f16\""), ["f16", "f64"]),
         ("7".to_owned(), ["a checkpoint of contact-dynamics", "integer"]),
@@ -518,25 +518,41 @@ fn other_files_and_formats_are_refused_in_words() {
     document["state"]["contacts"]["closed"].as_array_mut().unwrap().pop();
     let refused = read(&document.to_string());
     assert!(refused.contains("closed flags") && refused.contains("size 1, expected 2"), "{refused}");
+    // Motions have one entry a dof if they are read, and none if they are not.
+    for (motion, entries, words) in [
+        ("/history/slots/0", json!([0.0, 0.0]), "size 2, expected 0"),
+        ("/history/slots/1", json!([]), "size 0, expected 2"),
+        ("/history/computed/states/0/0", json!([0.0]), "size 1, expected 2"),
+    ] {
+        let mut document: Value = serde_json::from_str(&files.text).unwrap();
+        document.pointer_mut(motion).unwrap()["u"] = entries;
+        let refused = read(&document.to_string());
+        assert!(refused.contains("displacement of a checkpoint") && refused.contains(words), "{refused}");
+    }
+    let mut document: Value = serde_json::from_str(&files.text).unwrap();
+    document["history"]["slots"].as_array_mut().unwrap().truncate(1);
+    let refused = read(&document.to_string());
+    assert!(refused.contains("the past of a checkpoint"), "{refused}");
 }
 
 #[test]
 fn another_layout_is_another_format() {
     let [files, _] = samples();
     let document: Value = serde_json::from_str(&files.text).unwrap();
-    assert_eq!(document["format"], "contact-dynamics checkpoint 5");
+    assert_eq!(document["format"], "contact-dynamics checkpoint 6");
     // Whoever changes one of these lists, or the order or meaning of what is in them, raises the number above.
     for (path, names) in [
-        ("", "format history rows scalar scheme state"),
-        ("/state", "broken_bonds contacts motion shown"),
-        ("/state/motion", "acceleration displacement time velocity"),
+        ("", "format history rows scalar state"),
+        ("/state", "broken contacts motion rates"),
+        ("/state/motion", "a t u v"),
         (
             "/state/contacts",
-            "closed dissipated forces friction gaps ids impulses lambda_a lambda_v raw_forces sliding slips",
+            "closed dissipated gap ids impulse lambda lambda_a lambda_raw lambda_v sliding slip tangents",
         ),
-        ("/history", "clock known made_with overclosures pace past slopes smooth trail trail_room unmoved"),
+        ("/history", "clock computed known made_with overclosures pace scheme slopes slots smooth unshifted"),
         ("/history/clock", "elapsed h origin steps"),
         ("/history/pace", "grown kept lasting level nominal patience position steps"),
+        ("/history/computed", "known states"),
         ("/history/overclosures", "depths over start"),
     ] {
         let fields = document.pointer(path).and_then(Value::as_object).unwrap();
@@ -696,15 +712,14 @@ fn friction_goes_on_too() {
         assert_eq!(resumed.energy(), other.energy());
     }
     let mut document: Value = serde_json::from_str(&save(&run).text).unwrap();
-    assert_eq!(document["state"]["contacts"]["friction"], json!([[0, 0.3, 1], [2, 0.1, 1]]));
+    assert_eq!(document["state"]["contacts"]["tangents"], json!([[0.3, 1], [0.0, 0], [0.1, 1]]));
     for (field, value, words) in [
-        ("friction", json!([[0, 0.3, 1]]), "contact forces"),
-        ("friction", json!([[2, 0.3, 1], [0, 0.1, 1]]), "contact with friction"),
-        ("friction", json!([[0, -0.3, 1], [2, 0.1, 1]]), "friction coefficient"),
-        ("friction", json!([[0, 0.3, 3], [2, 0.1, 1]]), "tangents of a contact"),
-        ("friction", json!([[0, 0.3, 1], [7, 0.1, 1]]), "contact with friction"),
+        ("tangents", json!([[0.3, 1], [0.0, 0], [0.1, 0]]), "contact forces"),
+        ("tangents", json!([[0.3, 1], [0.1, 1]]), "friction of the contacts"),
+        ("tangents", json!([[-0.3, 1], [0.0, 0], [0.1, 1]]), "friction coefficient"),
+        ("tangents", json!([[0.3, 3], [0.0, 0], [0.1, 1]]), "tangents of a contact"),
         ("sliding", json!([true]), "sliding contacts"),
-        ("slips", json!([0.0]), "slips"),
+        ("slip", json!([0.0]), "slips"),
     ] {
         let before = std::mem::replace(&mut document["state"]["contacts"][field], value);
         let refused = serde_json::from_str::<Checkpoint<f64>>(&document.to_string()).unwrap_err().to_string();

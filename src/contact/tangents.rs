@@ -6,6 +6,8 @@ use std::ops::Range;
 
 /// The tangential rows of the contacts of a run that have friction. Nothing is stored if none has.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "Vec<(f64, usize)>", try_from = "Vec<(f64, usize)>"))]
 pub(crate) struct Tangents {
     /// For each contact its first tangential row, and after the last contact the end of all; empty without friction.
     first: Vec<usize>,

@@ -1,11 +1,10 @@
 //! A run at one instant as one value, for saving and restoring.
 
-use super::State;
 use super::history::History;
-use super::record::Record;
+use super::record::{Format, HistoryRecord, Record, ScalarName, StateRecord};
+use super::{Motion, State};
 use crate::real::Real;
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// State and history of a run at one instant: all data that its later steps read, for saving in any format of serde.
 /// Requires the feature `serde`.
@@ -61,16 +60,27 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// [`build`](crate::SimulationBuilder::build) checks what depends on the simulation: number of dofs, scheme, step
 /// size, and that the state matches the end of its history. Wrong but possible numbers are not detected: use
 /// checksums.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "T: Real", try_from = "Record<T>")]
 pub struct Checkpoint<T> {
-    pub(crate) state: State<T>,
-    /// Without spare slots: past states only.
-    pub(crate) history: History<T>,
+    pub(super) format: Format,
+    pub(super) scalar: ScalarName<T>,
     /// Fingerprint of the rows of the scheme.
     pub(crate) rows: u32,
+    #[serde(with = "StateRecord")]
+    pub(crate) state: State<T>,
+    /// Motions that nothing reads are empty.
+    #[serde(with = "HistoryRecord")]
+    pub(crate) history: History<T>,
 }
 
 impl<T: Real> Checkpoint<T> {
+    pub(crate) fn new(state: State<T>, mut history: History<T>, rows: u32) -> Self {
+        let spare = history.motions(state.is_shifted()).filter(|(is_read, _)| !is_read);
+        spare.for_each(|(_, motion)| *motion = Motion::zero(0));
+        Self { format: Format, scalar: ScalarName::default(), rows, state, history }
+    }
+
     /// The state.
     pub fn state(&self) -> &State<T> {
         &self.state
@@ -84,18 +94,5 @@ impl<T: Real> Checkpoint<T> {
     /// Name of the scheme that created it.
     pub fn scheme(&self) -> &str {
         &self.history.scheme
-    }
-}
-
-impl<T: Real> Serialize for Checkpoint<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Record::of(&self.state, &self.history, self.rows).serialize(serializer)
-    }
-}
-
-impl<'de, T: Real> Deserialize<'de> for Checkpoint<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let (state, history, rows) = Record::deserialize(deserializer)?.checked().map_err(D::Error::custom)?;
-        Ok(Self { state, history, rows })
     }
 }

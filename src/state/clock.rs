@@ -1,7 +1,7 @@
 //! Time, and the position of a changing step size in the grid of the nominal one.
 
 #[cfg(feature = "serde")]
-use super::read::{COUNT, count, number};
+use super::read::{COUNT, count, finite, not_negative, number, positive};
 use crate::error::{Error, Result};
 use crate::rounding::{TIME_SHARE, time_resolution};
 
@@ -69,11 +69,11 @@ impl Clock {
     /// Rejects values that no run produces.
     pub(super) fn check_read(&self) -> Result<()> {
         let Self { origin, elapsed, steps, h } = *self;
-        number("the start time of a checkpoint", origin, "finite", f64::is_finite)?;
-        number("the time elapsed of a checkpoint", elapsed, "finite, not negative", |x| x >= 0.0 && x.is_finite())?;
-        number("the step size of a checkpoint", h, "positive and finite", |h| h > 0.0 && h.is_finite())?;
+        finite("the start time of a checkpoint", origin)?;
+        not_negative("the time elapsed of a checkpoint", elapsed)?;
+        positive("the step size of a checkpoint", h)?;
         count("the number of steps of a checkpoint", steps, 0..=COUNT)?;
-        number("the time of a checkpoint", self.at(0.0), "finite", f64::is_finite)
+        finite("the time of a checkpoint", self.at(0.0))
     }
 }
 
@@ -141,8 +141,7 @@ impl Pace {
         for kept in kept {
             count("the halvings of a checkpoint that growth keeps", kept.into(), 0..=level.into())?;
         }
-        let is_time = |time: f64| time >= 0.0 && time.is_finite();
-        number("the time between changes of contact of a checkpoint", lasting, "finite, not negative", is_time)?;
+        not_negative("the time between changes of contact of a checkpoint", lasting)?;
         count("the patience of a checkpoint", patience.into(), PATIENCE[0].into()..=PATIENCE[1].into())
     }
 

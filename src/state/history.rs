@@ -33,10 +33,11 @@ pub struct History<T> {
 
 /// Motions before the current one as computed, newest first, with any spacing.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: Real"))]
 pub(crate) struct ComputedMotions<T> {
     /// Each motion with the step size that led to it; entries beyond `known` are spare.
     states: Vec<(Motion<T>, f64)>,
-    known: usize,
+    pub(super) known: usize,
 }
 
 impl<T: Real> ComputedMotions<T> {
@@ -46,14 +47,6 @@ impl<T: Real> ComputedMotions<T> {
         for (motion, h) in known.iter().rev() {
             computed.push(motion, *h);
         }
-        computed
-    }
-
-    /// Memory for `length` states, of which these are known.
-    #[cfg(feature = "serde")]
-    pub(super) fn of(known: Vec<(Motion<T>, f64)>, length: usize, dofs: usize) -> Self {
-        let mut computed = Self { known: known.len(), states: known };
-        computed.states.resize_with(length, || (Motion::zero(dofs), 0.0));
         computed
     }
 
@@ -84,7 +77,7 @@ impl<T: Real> ComputedMotions<T> {
 
     /// All motions, including spare ones.
     #[cfg(feature = "serde")]
-    pub(super) fn all(&mut self) -> impl Iterator<Item = &mut Motion<T>> {
+    pub(crate) fn all(&mut self) -> impl Iterator<Item = &mut Motion<T>> {
         self.states.iter_mut().map(|(motion, _)| motion)
     }
 
@@ -117,6 +110,21 @@ impl<T: Real> History<T> {
     pub fn past(&self, k: usize) -> Option<(&[T], &[T], &[T])> {
         let motion = self.slots.get(k).filter(|_| (1..self.known).contains(&k))?;
         Some((&motion.u, &motion.v, &motion.a))
+    }
+
+    /// Number of states that steps and changes of the step size read, including the current one. One-step schemes read
+    /// no past; if they store v or a at another time (`is_shifted`), a first change of the step size reads one.
+    #[cfg(feature = "serde")]
+    pub(super) fn read(&self, is_shifted: bool) -> usize {
+        self.known.max(if is_shifted { self.smooth.min(2) } else { 1 })
+    }
+
+    /// All motions, and whether they are read.
+    #[cfg(feature = "serde")]
+    pub(super) fn motions(&mut self, is_shifted: bool) -> impl Iterator<Item = (bool, &mut Motion<T>)> {
+        let (past, known) = (1..self.read(is_shifted), self.computed.known);
+        let slots = self.slots.iter_mut().enumerate().map(move |(slot, motion)| (past.contains(&slot), motion));
+        slots.chain(self.computed.all().enumerate().map(move |(state, motion)| (state < known, motion)))
     }
 
     /// The motion of the stage that is being solved, and the states before it.

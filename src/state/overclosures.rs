@@ -1,8 +1,10 @@
 //! Overlaps at the start of a run: their depths, and the share of them that is left later.
 
+#[cfg(feature = "serde")]
+use super::read::{finite, number, positive};
 use crate::contact_id::ContactId;
 #[cfg(feature = "serde")]
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::real::Real;
 
 /// Depths of overlaps at the start of a run, which are added to the gaps from then on, or for a time.
@@ -34,22 +36,13 @@ impl<T: Real> Overclosures<T> {
     /// Checks overclosures read from a checkpoint, and refuses values that no run produces.
     #[cfg(feature = "serde")]
     pub(super) fn check_read(&self) -> Result<()> {
-        let Self { depths, start, over } = self;
-        let refuse = |name, value, range| Err(Error::Parameter { name, value, range });
-        let above = |x: f64| x > 0.0 && x.is_finite();
-        if !start.is_finite() {
-            return refuse("the start of the overclosures of a checkpoint", *start, "finite");
-        }
-        if let Some(over) = over.filter(|&over| !above(over)) {
-            return refuse("the time over which overclosures are removed", over, "positive and finite");
-        }
-        if let Some((_, depth)) = depths.iter().find(|(_, depth)| !depth.is_finite()) {
-            return refuse("an overclosure of a checkpoint", depth.value(), "finite");
-        }
-        match depths.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
-            Some(pair) => refuse("a feature of the overclosures of a checkpoint", pair[1].0.1 as f64, "ascending"),
-            None => Ok(()),
-        }
+        finite("the start of the overclosures of a checkpoint", self.start)?;
+        self.over.map_or(Ok(()), |over| positive("the time over which overclosures are removed", over))?;
+        self.depths.iter().try_for_each(|(_, depth)| finite("an overclosure of a checkpoint", depth.value()))?;
+        self.depths.windows(2).try_for_each(|pair| {
+            let feature = pair[1].0.1 as f64;
+            number("a feature of the overclosures of a checkpoint", feature, "ascending", |_| pair[0].0 < pair[1].0)
+        })
     }
 
     /// Whether the depths are removed over time.

@@ -106,12 +106,11 @@ impl<T: Real> Checkpoint<T> {
         }
     }
 
-    /// All vectors with one entry per dof, in a fixed order.
+    /// All vectors with one entry per dof, in a fixed order; those that nothing reads are empty.
     fn vectors(&mut self) -> impl Iterator<Item = &mut Vec<T>> {
         let (state, history) = (&mut self.state, &mut self.history);
         let motions = std::iter::once(&mut state.motion).chain(&mut history.slots).chain(history.computed.all());
         let fields = motions.flat_map(|motion| [&mut motion.u, &mut motion.v, &mut motion.a]);
-        let others = state.rates.iter_mut().chain(&mut history.unshifted).filter(|values| !values.is_empty());
-        fields.chain(others)
+        fields.chain(&mut state.rates).chain(&mut history.unshifted).filter(|values| !values.is_empty())
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::real::Real;
-use std::borrow::Cow;
 
 /// Upper bound of counts in a run; counts up to here are exact in `f64` and far from overflow.
 pub(super) const COUNT: u64 = 1 << 53;
@@ -15,19 +14,13 @@ pub(super) fn length(what: &'static str, found: usize, expected: usize) -> Resul
     }
 }
 
-/// The entries of a vector, if they are finite and as many as expected.
-pub(super) fn vector<T: Real>(what: &'static str, values: Cow<'_, [T]>, expected: usize) -> Result<Vec<T>> {
+/// Rejects a vector of another length than expected, or with entries that are not finite.
+pub(super) fn vector<T: Real>(what: &'static str, values: &[T], expected: usize) -> Result<()> {
     length(what, values.len(), expected)?;
     match values.iter().position(|x| !x.is_finite()) {
         Some(index) => Err(Error::NotFinite { what, index, value: values[index].value() }),
-        None => Ok(values.into_owned()),
+        None => Ok(()),
     }
-}
-
-/// The same for a vector that may be missing and is then empty.
-pub(super) fn optional<T: Real>(what: &'static str, values: Cow<'_, [T]>, expected: usize) -> Result<Vec<T>> {
-    let expected = if values.is_empty() { 0 } else { expected };
-    vector(what, values, expected)
 }
 
 /// Rejects a number that is not in range.
@@ -36,6 +29,21 @@ pub(super) fn number(name: &'static str, value: f64, range: &'static str, is_fin
         true => Ok(()),
         false => Err(Error::Parameter { name, value, range }),
     }
+}
+
+/// Rejects a number that is infinite or no number.
+pub(super) fn finite(name: &'static str, value: f64) -> Result<()> {
+    number(name, value, "finite", f64::is_finite)
+}
+
+/// Rejects a duration that is not positive and finite.
+pub(super) fn positive(name: &'static str, value: f64) -> Result<()> {
+    number(name, value, "positive and finite", |value| value > 0.0 && value.is_finite())
+}
+
+/// Rejects a number that is negative, infinite or no number.
+pub(super) fn not_negative(name: &'static str, value: f64) -> Result<()> {
+    number(name, value, "finite, not negative", |value| value >= 0.0 && value.is_finite())
 }
 
 /// Rejects a count that is not in range.

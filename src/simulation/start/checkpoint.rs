@@ -10,8 +10,7 @@ impl<T: Real> Simulation<'_, T> {
     /// A copy of state and history as they are now, to be saved. With the feature `serde`.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint<T> {
-        let (state, history) = (self.state.clone(), self.history.clone());
-        Checkpoint { state, history, rows: self.scheme.tableau.fingerprint() }
+        Checkpoint::new(self.state.clone(), self.history.clone(), self.scheme.tableau.fingerprint())
     }
 }
 

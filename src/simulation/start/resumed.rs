@@ -15,7 +15,7 @@ use crate::system::{check_step_size, check_vector};
 pub(crate) struct Resumed<T> {
     state: State<T>,
     history: History<T>,
-    /// Fingerprint of the rows that made a checkpoint; its history has no spare slots.
+    /// Fingerprint of the rows that made a checkpoint; motions that nothing reads are empty in its history.
     #[cfg(feature = "serde")]
     rows: Option<u32>,
 }
@@ -34,8 +34,7 @@ impl<T: Real> Resumed<T> {
 
     #[cfg(feature = "serde")]
     pub(crate) fn from_checkpoint(checkpoint: Checkpoint<T>) -> Self {
-        let Checkpoint { state, history, rows } = checkpoint;
-        Self { state, history, rows: Some(rows) }
+        Self { state: checkpoint.state, history: checkpoint.history, rows: Some(checkpoint.rows) }
     }
 
     pub(crate) fn clock(&self) -> Clock {
@@ -83,7 +82,7 @@ fn check_scheme<T: Real>(history: &History<T>, scheme: &Scheme<'_>) -> Result<()
     Ok(())
 }
 
-/// The history of a checkpoint with the spare slots that a run of the scheme has.
+/// The history of a checkpoint with memory for the motions that are spare.
 #[cfg(feature = "serde")]
 fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_>, rows: u32) -> Result<History<T>> {
     let refuse = |reason| Err(Error::Incompatible { part: format!("a checkpoint of {}", history.scheme), reason });
@@ -97,9 +96,10 @@ fn fitted<T: Real>(state: &State<T>, mut history: History<T>, scheme: &Scheme<'_
     let shown = state.rates.each_ref().map(|rate| !rate.is_empty());
     let moved = history.unshifted.iter().zip(shifted).any(|(unshifted, shifted)| !unshifted.is_empty() && !shifted);
     let length = computed == 0 || computed == computed_capacity(scheme);
-    if history.known > scheme.depth || history.slots.len() > slots || !length || moved || shown != shifted {
+    if history.known > scheme.depth || history.slots.len() != slots || !length || moved || shown != shifted {
         return refuse("it does not hold what this scheme reads");
     }
-    history.slots.resize(slots, Motion::zero(state.motion.u.len()));
+    let spare = history.slots.iter_mut().chain(history.computed.all()).filter(|motion| motion.u.is_empty());
+    spare.for_each(|motion| *motion = Motion::zero(state.motion.u.len()));
     Ok(history)
 }
