@@ -1,7 +1,7 @@
 //! Rows of G with the gaps at their point of linearization. Between two linearizations gaps are affine.
 
 use super::surface::{Nodes, Point};
-use super::{Contact, ContactJacobian};
+use super::{Candidates, Contact, ContactJacobian};
 use crate::real::Real;
 
 /// The state at a search: time, displacements, velocities, and the time that the search looks ahead.
@@ -96,5 +96,73 @@ impl<T: Real> AffineRows<T> {
         let start = &displacements[jacobian.pointers[row]..jacobian.pointers[row + 1]];
         let moved = jacobian.row(row).zip(start).map(|((place, weight), &start)| weight * (u[place] - start));
         T::of(gaps[row]) + moved.sum()
+    }
+}
+
+/// The rows of a search, linearized: for each row its identity, what is known at its point of contact, and the offset
+/// of the surfaces.
+#[derive(Debug)]
+pub(super) struct Rows<T, Identity, Spot> {
+    pub(super) affine: AffineRows<T>,
+    pub(super) identities: Vec<Identity>,
+    pub(super) spots: Vec<Spot>,
+    /// The offset at full size, and its factor in the gap of the linearization.
+    pub(super) offsets: Vec<(f64, f64)>,
+    /// The same number of tangents for each row, where they are found together with the rows.
+    pub(super) tangents: ContactJacobian<T>,
+}
+
+impl<T: Real, Identity: Copy + PartialEq, Spot: Copy> Rows<T, Identity, Spot> {
+    pub(super) fn new() -> Self {
+        Self {
+            affine: AffineRows::default(),
+            identities: Vec::new(),
+            spots: Vec::new(),
+            offsets: Vec::new(),
+            tangents: ContactJacobian::default(),
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.affine.clear();
+        self.identities.clear();
+        self.spots.clear();
+        self.offsets.clear();
+        self.tangents.clear();
+    }
+
+    /// Appends what belongs to a row, beside its entries and tangents.
+    pub(super) fn describe(&mut self, identity: Identity, spot: Spot, offset: (f64, f64)) {
+        self.identities.push(identity);
+        self.spots.push(spot);
+        self.offsets.push(offset);
+    }
+
+    /// Appends a copy of a row of another list.
+    pub(super) fn keep(&mut self, other: &Self, row: usize) {
+        self.affine.keep(&other.affine, row);
+        self.describe(other.identities[row], other.spots[row], other.offsets[row]);
+        let count = other.tangents.rows() / other.identities.len();
+        (row * count..(row + 1) * count).for_each(|tangent| self.tangents.push_row(&other.tangents, tangent));
+    }
+
+    /// Exchanges the rows for those found now, and returns whether these are others.
+    pub(super) fn replace(&mut self, found: &mut Self) -> Candidates {
+        let same = self.identities == found.identities && self.affine.jacobian == found.affine.jacobian;
+        std::mem::swap(self, found);
+        Candidates::changed_if(!same)
+    }
+
+    /// The gap of a row at u, with this factor of the offsets.
+    pub(super) fn gap(&self, row: usize, factor: f64, u: &[T]) -> T {
+        let (offset, then) = self.offsets[row];
+        self.affine.gap(row, u) - T::of((factor - then) * offset)
+    }
+
+    /// The gaps of all rows.
+    pub(super) fn gaps(&self, factor: f64, u: &[T], gaps: &mut [T]) {
+        for (row, gap) in gaps.iter_mut().enumerate().take(self.identities.len()) {
+            *gap = self.gap(row, factor, u);
+        }
     }
 }

@@ -354,9 +354,9 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { affine, pairs, crossings, .. } = &self.rows;
+        let Rows { affine, identities, spots, .. } = &self.rows;
         let sides = self.sides(0.0);
-        for (row, (&index, crossing)) in pairs.iter().zip(crossings).enumerate() {
+        for (row, (&index, crossing)) in identities.iter().zip(spots).enumerate() {
             let pair = sides.pair(index);
             let [ends, _] = pair.ends(&|node| self.nodes.positions[node]);
             let position = Edge::point(ends, crossing.shares[0].clamp(0.0, 1.0));
@@ -385,23 +385,20 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
                 self.find_rows(&SearchState { t, u, v, ahead });
             }
         }
-        let (rows, found) = (&self.rows, &self.found);
-        let same = rows.pairs == found.pairs && rows.affine.jacobian == found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(Candidates::changed_if(!same))
+        Ok(self.rows.replace(&mut self.found))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
         check_local(u.len(), self.dofs().len())?;
         // If a trial state is not finite, the gaps are not finite either.
-        if self.rows.pairs.is_empty() || self.nodes.move_to(u).is_err() {
+        if self.rows.identities.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(Candidates::Unchanged);
         }
         let Self { nodes, edges, surfaces, vicinity, rows, found, .. } = self;
         let sides = Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) };
         let at = |node: usize| nodes.positions[node];
         found.clear();
-        for (row, (&index, before)) in rows.pairs.iter().zip(&rows.crossings).enumerate() {
+        for (row, (&index, before)) in rows.identities.iter().zip(&rows.spots).enumerate() {
             let pair = sides.pair(index);
             // If the edges have become parallel, the row stays.
             let crossing = Crossing::of(pair.ends(&at)).filter(|crossing| crossing.sine >= 0.5 * LEAST_SINE);
@@ -414,24 +411,19 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
                 None => found.keep(rows, row),
             }
         }
-        let same = rows.affine.jacobian == found.affine.jacobian;
-        std::mem::swap(rows, found);
-        Ok(Candidates::changed_if(!same))
+        Ok(rows.replace(found))
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let now = self.vicinity.thickness.ramp.at(t);
-        for ((row, gap), (radius, then)) in gaps.iter_mut().enumerate().zip(&self.rows.rounding) {
-            *gap = self.rows.affine.gap(row, u) - T::of((now - then) * radius);
-        }
+        self.rows.gaps(self.vicinity.thickness.ramp.at(t), u, gaps);
         Ok(())
     }
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        let Rows { pairs, crossings, .. } = &self.rows;
+        let Rows { identities, spots, .. } = &self.rows;
         let (sides, ramp) = (self.sides(t), &self.vicinity.thickness.ramp);
         let [change, bend] = [ramp.rate(t), ramp.acceleration(t)];
-        for (rates, (&index, crossing)) in rates.iter_mut().zip(pairs.iter().zip(crossings)) {
+        for (rates, (&index, crossing)) in rates.iter_mut().zip(identities.iter().zip(spots)) {
             let pair = sides.pair(index);
             let at = |node: usize| add_scaled(self.nodes.coordinates[node], 1.0, self.nodes.vector(node, u));
             let velocity = |node: usize| self.nodes.vector(node, v);

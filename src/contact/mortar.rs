@@ -407,9 +407,9 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { affine, places, spots, tangents } = &self.rows;
+        let Rows { affine, identities, spots, tangents, .. } = &self.rows;
         let count = self.tangents();
-        for (row, (&place, spot)) in places.iter().zip(spots).enumerate() {
+        for (row, (&place, spot)) in identities.iter().zip(spots).enumerate() {
             let name = (self.surfaces[0].nodes()[place], 0);
             let mut contact = contacts.push_row(name, self.settings.given_law(), (&affine.jacobian, row));
             contact.at(spot.position, spot.normal);
@@ -451,9 +451,8 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             Some(bonds) => bonds.search(slave, &SearchState { t, u, v, ahead })?,
             None => Candidates::Unchanged,
         };
-        let same = self.rows.places == self.found.places && self.rows.affine.jacobian == self.found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(Candidates::changed_if(!same || tied == Candidates::Changed))
+        let found = self.rows.replace(&mut self.found);
+        Ok(Candidates::changed_if([found, tied].contains(&Candidates::Changed)))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
@@ -463,41 +462,35 @@ impl<T: Real> ContactConstraint<T> for Mortar<T> {
             None => Candidates::Unchanged,
         };
         // If a trial state is not finite, the gaps are not finite either.
-        if self.rows.places.is_empty() || self.nodes.move_to(u).is_err() {
+        if self.rows.identities.is_empty() || self.nodes.move_to(u).is_err() {
             return Ok(tied);
         }
         self.integrate(t);
         self.found.clear();
-        let count = self.tangents();
+        let rubs = self.tangents() > 0;
         // Evaluated only if a row is uncovered.
         let is_covered = |&place: &usize| self.integrals.sums[place].is_covered();
-        let near = self.rows.places.iter().all(is_covered) || self.moved_since_search() <= BEYOND * self.finest();
+        let near = self.rows.identities.iter().all(is_covered) || self.moved_since_search() <= BEYOND * self.finest();
         let Self { rows, found, integrals, nodes, surfaces: [slave, _], vicinity, .. } = self;
-        let made = Made { rubs: count > 0, nodes, slave, factor: vicinity.thickness.ramp.at(t), u };
-        for (row, &place) in rows.places.iter().enumerate() {
+        let made = Made { rubs, nodes, slave, factor: vicinity.thickness.ramp.at(t), u };
+        for (row, &place) in rows.identities.iter().enumerate() {
             if found.push(place, integrals, &made) {
                 continue;
             }
             // The row is no longer covered. An open row stays open, and a node just beyond the rim finishes its step.
-            let spot = &rows.spots[row];
-            let gap = rows.affine.gap(row, u).value() - (made.factor - spot.factor) * spot.offset;
+            let gap = rows.gap(row, made.factor, u).value();
             if !near && gap <= OPEN * vicinity.reach.least() {
                 let contact = ContactId { constraint: 0, feature: slave.nodes()[place], candidate: 0 };
                 return Err(Error::ContactLost { t, contact });
             }
-            found.keep(rows, row, count);
+            found.keep(rows, row);
         }
-        let same = rows.affine.jacobian == found.affine.jacobian;
-        std::mem::swap(rows, found);
-        Ok(Candidates::changed_if(!same || tied == Candidates::Changed))
+        Ok(Candidates::changed_if([rows.replace(found), tied].contains(&Candidates::Changed)))
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.vicinity.thickness.ramp.at(t);
         let (own, tied) = gaps.split_at_mut(self.rows.spots.len());
-        for (row, (gap, spot)) in own.iter_mut().zip(&self.rows.spots).enumerate() {
-            *gap = self.rows.affine.gap(row, u) - T::of((factor - spot.factor) * spot.offset);
-        }
+        self.rows.gaps(self.vicinity.thickness.ramp.at(t), u, own);
         self.bonds.as_mut().map_or(Ok(()), |bonds| bonds.tie_mut().gaps(t, u, tied))
     }
 

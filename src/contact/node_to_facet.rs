@@ -258,8 +258,8 @@ impl<T: Real> NodeToFacet<T> {
             leaves_edges: false,
             rebuilds: 0,
             cones: [Cones::default(), Cones::default()],
-            rows: Rows::default(),
-            found: Rows::default(),
+            rows: Rows::new(),
+            found: Rows::new(),
         })
     }
 
@@ -336,7 +336,7 @@ impl<T: Real> NodeToFacet<T> {
 
     /// Index of the facet of a row of the last search, in the list of its pass.
     pub fn facet(&self, row: usize) -> usize {
-        self.rows.stands[row].facet
+        self.rows.spots[row].facet
     }
 
     /// How often the lists of facets have been built. If this is often, a larger [`skin`](SurfaceSettings::skin) may

@@ -30,7 +30,7 @@ impl<T: Real> EdgeToEdge<T> {
 
     fn check_paths(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
-        for (row, &index) in self.rows.pairs.iter().enumerate() {
+        for (row, &index) in self.rows.identities.iter().enumerate() {
             if let Err((what, path, gap)) = self.check_row(row, step, index, (&start, &end)) {
                 return Err(step.rejected((index[0], index[1]), what, path, gap));
             }
@@ -49,7 +49,8 @@ impl<T: Real> EdgeToEdge<T> {
                 let index = [first, list.map_or(k, |list| list[k])];
                 let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
                 // Edges stopped by a spring penetrate.
-                let springs = self.settings.given_law().is_compliant() && self.rows.pairs.binary_search(&index).is_ok();
+                let springs =
+                    self.settings.given_law().is_compliant() && self.rows.identities.binary_search(&index).is_ok();
                 if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
                     continue;
                 }
@@ -73,7 +74,7 @@ impl<T: Real> EdgeToEdge<T> {
         if step.closed[0][row] || !step.closed[1][row] {
             return Ok(());
         }
-        let normal = self.rows.crossings[row].normal;
+        let normal = self.rows.spots[row].normal;
         let [before, after] = [pair.ends(start), pair.ends(end)];
         let Some([from, to]) = Crossing::of(before).zip(Crossing::of(after)).map(<[Crossing; 2]>::from) else {
             return Ok(());

@@ -82,7 +82,7 @@ impl<T: Real> Mortar<T> {
                 }
             }
         }
-        for (row, &place) in self.rows.places.iter().enumerate() {
+        for (row, &place) in self.rows.identities.iter().enumerate() {
             let sums = &integrals.sums[place];
             let stopped = !step.closed[0][row] && step.closed[1][row];
             if stopped && sums.is_covered() && sums.gap() > LARGEST_MISS * path {

@@ -21,8 +21,8 @@ impl<T: Real> Mortar<T> {
         let Rates { integrals, differences } = &mut work.rates;
         let thickness = &vicinity.thickness;
         let change = thickness.ramp.rate(t);
-        for (out, spot) in out.iter_mut().zip(&rows.spots) {
-            out.rate = T::of(-change * spot.offset);
+        for (out, (offset, _)) in out.iter_mut().zip(&rows.offsets) {
+            out.rate = T::of(-change * offset);
         }
         let all = || nodes.bodies().iter().flatten();
         let gaps = |time: f64, positions: &[Point], list: &mut Vec<f64>| {
@@ -35,7 +35,7 @@ impl<T: Real> Mortar<T> {
                 integrals.sum(surfaces, positions, offsets, *multiplier, pairs);
             }
             let sums = if is_known { &known.sums } else { &integrals.sums };
-            list.extend(rows.places.iter().map(|&place| sums[place].gap_if_covered()));
+            list.extend(rows.identities.iter().map(|&place| sums[place].gap_if_covered()));
         };
         differences.find(
             nodes,

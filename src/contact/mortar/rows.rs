@@ -1,21 +1,12 @@
 //! The rows of weighted gaps: entries of G, tangents, and positions of contacts.
 
 use super::integrals::{Entry, Integrals};
-use crate::contact::ContactJacobian;
-use crate::contact::affine_rows::AffineRows;
+use crate::contact::affine_rows;
 use crate::contact::surface::{Nodes, Point, Surface};
 use crate::real::Real;
 
-/// The rows of a search, at their point of linearization.
-#[derive(Debug)]
-pub(super) struct Rows<T> {
-    pub(super) affine: AffineRows<T>,
-    /// The slave node of each row, by its place among the nodes of its surface.
-    pub(super) places: Vec<usize>,
-    pub(super) spots: Vec<Spot>,
-    /// `dimension` − 1 tangents per row, if there is friction.
-    pub(super) tangents: ContactJacobian<T>,
-}
+/// Rows by the slave node, as its place among the nodes of its surface; their offset is the mean one of both surfaces.
+pub(super) type Rows<T> = affine_rows::Rows<T, usize, Spot>;
 
 /// Data from which rows are made: nodes, slave, whether there is friction, factor of offsets, and displacements.
 pub(super) struct Made<'a, T> {
@@ -31,28 +22,9 @@ pub(super) struct Spot {
     pub(super) position: Point,
     pub(super) normal: Point,
     pub(super) area: f64,
-    /// The mean offset of the two surfaces at full size, and its factor in the gap.
-    pub(super) offset: f64,
-    pub(super) factor: f64,
 }
 
 impl<T: Real> Rows<T> {
-    pub(super) fn new() -> Self {
-        Self {
-            affine: AffineRows::default(),
-            places: Vec::new(),
-            spots: Vec::new(),
-            tangents: ContactJacobian::default(),
-        }
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.affine.clear();
-        self.places.clear();
-        self.spots.clear();
-        self.tangents.clear();
-    }
-
     /// Appends the row of a slave node, if it is covered; returns whether it is.
     pub(super) fn push(&mut self, place: usize, integrals: &mut Integrals, made: &Made<'_, T>) -> bool {
         let Made { nodes, slave, rubs, factor, u } = *made;
@@ -61,9 +33,8 @@ impl<T: Real> Rows<T> {
         let entries = integrals.row(slave.corners_at(place));
         let vectors = entries.iter().map(|entry| (nodes.places(entry.node), entry.weight(&sums)));
         self.affine.push_vectors(sums.gap(), vectors, u);
-        self.places.push(place);
-        let (position, offset) = (sums.position(), sums.offset());
-        self.spots.push(Spot { position, normal, area: sums.area, offset, factor });
+        let spot = Spot { position: sums.position(), normal, area: sums.area };
+        self.describe(place, spot, (sums.offset(), factor));
         if rubs {
             for direction in nodes.tangents(normal) {
                 let slip = |entry: &Entry| direction.map(|x| entry.share / sums.area * x);
@@ -72,16 +43,6 @@ impl<T: Real> Rows<T> {
             }
         }
         true
-    }
-
-    /// Appends a copy of a row of another list.
-    pub(super) fn keep(&mut self, other: &Self, row: usize, tangents: usize) {
-        self.affine.keep(&other.affine, row);
-        self.places.push(other.places[row]);
-        self.spots.push(other.spots[row]);
-        for tangent in row * tangents..(row + 1) * tangents {
-            self.tangents.push_row(&other.tangents, tangent);
-        }
     }
 }
 

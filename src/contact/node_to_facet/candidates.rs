@@ -1,6 +1,5 @@
 //! The candidates of contact: a search finds them, and `follow` projects their nodes again.
 
-use super::rows::Rows;
 use super::{NodeToFacet, Pass};
 use crate::contact::affine_rows::SearchState;
 use crate::contact::surface::{Bounds, Ground, Kept, Offsets, Point, Stand, Surface, Vicinity};
@@ -118,7 +117,7 @@ impl<T: Real> NodeToFacet<T> {
             let (node, pass) = (group[0].0, pass_of(group[0].1));
             let first = next;
             next += group.len();
-            let stands = &rows.stands[first..next];
+            let stands = &rows.spots[first..next];
             let kept = Kept { reach, motion: motions[1 - pass], thick };
             let ground = ground((pass, passes), surfaces, vicinity, places, kept, half_digits::<T>().value());
             // The list of the node is complete for surfaces up to this distance.
@@ -140,7 +139,7 @@ impl<T: Real> NodeToFacet<T> {
                         None => found.keep(rows, row),
                     },
                     // No facet is near.
-                    None if known > 0.0 && gap_of(rows, row, places.1.factor, u).value() > OPEN * reach.least() => {
+                    None if known > 0.0 && rows.gap(row, places.1.factor, u).value() > OPEN * reach.least() => {
                         found.keep(rows, row);
                     }
                     // The first row of the node decides for all.
@@ -154,12 +153,6 @@ impl<T: Real> NodeToFacet<T> {
         }
         Ok(())
     }
-}
-
-/// The gap of a row at u, with this factor of the offsets.
-pub(super) fn gap_of<T: Real>(rows: &Rows<T>, row: usize, factor: f64, u: &[T]) -> T {
-    let stand = &rows.stands[row];
-    rows.affine.gap(row, u) - T::of((factor - stand.factor) * stand.offset)
 }
 
 /// The candidate number of an additional row of a node in a dent.

@@ -1,7 +1,7 @@
 //! Contact of nodes with facets as a constraint: its rows, search, gaps and rates.
 
 use super::NodeToFacet;
-use super::candidates::{gap_of, pass_of};
+use super::candidates::pass_of;
 use super::rows::Rows;
 use crate::contact::affine_rows::{SearchState, set_friction};
 use crate::contact::surface::{Shape, Surface, overhang};
@@ -15,8 +15,8 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn contacts(&self, contacts: &mut Contacts<T>) {
-        let Rows { identities, stands, affine, .. } = &self.rows;
-        for (row, (&(node, candidate), stand)) in identities.iter().zip(stands).enumerate() {
+        let Rows { identities, spots, affine, .. } = &self.rows;
+        for (row, (&(node, candidate), stand)) in identities.iter().zip(spots).enumerate() {
             let pass = pass_of(candidate);
             let mut contact = contacts.push_row((node, candidate), self.settings.given_law(), (&affine.jacobian, row));
             contact.at(self.nodes.positions[node], stand.normal);
@@ -54,10 +54,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
                 self.find_rows(pass, &boxes[1 - pass].inflated(wide), &speeds, &SearchState { t, u, v, ahead });
             }
         }
-        let (rows, found) = (&self.rows, &self.found);
-        let same = rows.identities == found.identities && rows.affine.jacobian == found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(Candidates::changed_if(!same))
+        Ok(self.rows.replace(&mut self.found))
     }
 
     fn follow(&mut self, t: f64, u: &[T]) -> Result<Candidates> {
@@ -68,9 +65,7 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
         }
         self.found.clear();
         self.move_rows(t, u)?;
-        let same = self.rows.affine.jacobian == self.found.affine.jacobian;
-        std::mem::swap(&mut self.rows, &mut self.found);
-        Ok(Candidates::changed_if(!same))
+        Ok(self.rows.replace(&mut self.found))
     }
 
     fn inspect(&mut self, step: &Stride<'_, T>) -> Result<()> {
@@ -78,16 +73,13 @@ impl<T: Real> ContactConstraint<T> for NodeToFacet<T> {
     }
 
     fn gaps(&mut self, t: f64, u: &[T], gaps: &mut [T]) -> Result<()> {
-        let factor = self.vicinity.thickness.ramp.at(t);
-        for (row, gap) in gaps.iter_mut().enumerate().take(self.rows.stands.len()) {
-            *gap = gap_of(&self.rows, row, factor, u);
-        }
+        self.rows.gaps(self.vicinity.thickness.ramp.at(t), u, gaps);
         Ok(())
     }
 
     fn rates(&mut self, t: f64, u: &[T], v: &[T], rates: &mut [GapRates<T>]) -> Result<Rates> {
-        let Rows { identities, stands, .. } = &self.rows;
-        for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(stands) {
+        let Rows { identities, spots, .. } = &self.rows;
+        for ((out, &(node, candidate)), stand) in rates.iter_mut().zip(identities).zip(spots) {
             let surface = self.own_surface.as_ref().filter(|_| pass_of(candidate) > 0).unwrap_or(&self.surface);
             let facet = &surface.facets()[stand.facet];
             let corners = facet.nodes.map(|vertex| self.moving(vertex, u, v));

@@ -72,7 +72,7 @@ impl<T: Real> NodeToFacet<T> {
                     offsets: self.vicinity.thickness.at(step.t[k]),
                     rounding: half_digits::<T>().value(),
                 });
-                let likely = row.map(|row| self.rows.stands[row].facet);
+                let likely = row.map(|row| self.rows.spots[row].facet);
                 let (law, recovery) = (self.settings.given_law(), self.recovery());
                 let crossing = Crossing { grounds: [start, end], place, likely, node, path, law, recovery };
                 let closed = row.map(|row| step.closed.map(|flags| flags[row]));
