@@ -243,11 +243,10 @@ impl<T: Real> Operator<T> {
         rows: &[usize],
         compliance: impl Fn(usize) -> T,
     ) -> Result<(&[T], u64)> {
-        let is_known = self.delassus.version > 0;
-        let mut changed = !is_known || self.delassus.rows != rows;
+        let mut changed = self.delassus.version == 0 || self.delassus.rows != rows;
         if changed {
             self.delassus.version = 0;
-            self.assemble(g, rows, is_known)?;
+            self.assemble(g, rows)?;
         }
         let Delassus { values, diagonal, version, .. } = &mut self.delassus;
         let most = largest_compliance::<T>();
@@ -264,31 +263,24 @@ impl<T: Real> Operator<T> {
         Ok((values, *version))
     }
 
-    /// Forms W of some rows, without compliances, from the W of other rows if it is known.
-    fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize], is_known: bool) -> Result<()> {
+    /// Forms W of some rows, without compliances.
+    fn assemble(&mut self, g: &ContactJacobian<T>, rows: &[usize]) -> Result<()> {
         self.prepare(g, rows)?;
         let Self { delassus, responses, diagonal: DiagonalResponses { reciprocals, products }, .. } = self;
+        delassus.begin(rows)?;
         let size = rows.len();
         match self.contact {
             ContactPath::Apart => {
-                delassus.begin(rows)?;
                 products.list(size, reciprocals.len(), |i| g.located(rows[i]))?;
                 for (k, &j) in rows.iter().enumerate() {
                     let response = g.located(j).map(|(place, weight)| (place, weight * reciprocals[place]));
                     products.each(response, |i, product| delassus.values[i * size + k] = product);
                 }
             }
-            ContactPath::Condensed | ContactPath::Full => {
-                let by_entry = !responses.couples_by_tiles(g, rows);
-                match is_known && by_entry {
-                    true => delassus.rearrange(rows)?,
-                    false => delassus.begin(rows)?,
-                }
-                match by_entry {
-                    true => responses.couple(g, (rows, &delassus.joined), &mut delassus.values),
-                    false => responses.couple_by_tiles(g, rows, &mut delassus.values),
-                }
-            }
+            ContactPath::Condensed | ContactPath::Full => match responses.couples_by_tiles(g, rows) {
+                true => responses.couple_by_tiles(g, rows, &mut delassus.values),
+                false => responses.couple(g, rows, &mut delassus.values),
+            },
         }
         delassus.end(rows);
         Ok(())

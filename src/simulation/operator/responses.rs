@@ -185,8 +185,7 @@ impl<T: Real> Responses<T> {
         8.0 * forms + solves
     }
 
-    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles): the rounding of its entries then
-    /// depends on the set of rows.
+    /// Whether W of some rows is formed [tile by tile](Self::couple_by_tiles).
     pub(crate) fn couples_by_tiles(&self, g: &ContactJacobian<T>, rows: &[usize]) -> bool {
         let entries = || rows.iter().map(|&row| g.located(row).count()).sum::<usize>();
         self.unit == Unit::Dof && entries() > SHORT * rows.len()
@@ -199,13 +198,11 @@ impl<T: Real> Responses<T> {
         self.tiles = tiles;
     }
 
-    /// The rows and columns of W = G A⁻¹ Gᵀ that belong to the `joined` places of some rows.
-    pub(crate) fn couple(&mut self, g: &ContactJacobian<T>, (rows, joined): (&[usize], &[usize]), w: &mut [T]) {
+    /// W = G A⁻¹ Gᵀ of some rows, row by row.
+    pub(crate) fn couple(&mut self, g: &ContactJacobian<T>, rows: &[usize], w: &mut [T]) {
         let mut whole = std::mem::take(&mut self.whole);
-        let mut next = joined.iter().peekable();
         for (k, &j) in rows.iter().enumerate() {
             let (first, response) = match self.unit {
-                _ if joined.is_empty() => break,
                 Unit::Row => self.column(j),
                 Unit::Dof => {
                     whole.clear();
@@ -215,16 +212,8 @@ impl<T: Real> Responses<T> {
                 }
             };
             let at = |place: usize| response.get(place.wrapping_sub(first)).copied().unwrap_or(T::zero());
-            let moved = |row: usize| g.located(row).map(|(place, weight)| weight * at(place)).sum::<T>();
-            let column = &mut w[k..];
-            if next.next_if(|place| **place == k).is_some() {
-                for (entry, &i) in column.iter_mut().step_by(rows.len()).zip(rows) {
-                    *entry = moved(i);
-                }
-            } else {
-                for &place in joined {
-                    column[place * rows.len()] = moved(rows[place]);
-                }
+            for (entry, &i) in w[k..].iter_mut().step_by(rows.len()).zip(rows) {
+                *entry = g.located(i).map(|(place, weight)| weight * at(place)).sum();
             }
         }
         self.whole = whole;
