@@ -18,14 +18,6 @@ pub(super) struct Layers {
 /// A dof without a place.
 const NONE: u32 = u32::MAX;
 
-/// Colors of dofs: dofs of one color and one layer are not coupled, so that a sweep can process them independently.
-struct Colors<'a, T> {
-    matrix: SparseColMatRef<'a, usize, T>,
-    colors: Vec<u8>,
-}
-
-const NO_COLOR: u8 = u8::MAX;
-
 impl Layers {
     /// Layers around the dofs `near`, or all dofs as one layer if the list is empty. Stored zeros couple no dofs.
     pub(super) fn around<T: Real>(
@@ -68,12 +60,6 @@ impl Layers {
             start = end;
         }
         (0..dofs).for_each(|dof| take(dof, &mut order));
-        let mut colors = Colors { matrix, colors: vec![NO_COLOR; dofs] };
-        start = 0;
-        for end in ends.iter().copied().chain([order.len()]) {
-            colors.sort(start, &mut order[start..end], &mut places);
-            start = end;
-        }
         if ends.is_empty() {
             ends.push(order.len());
         }
@@ -116,29 +102,6 @@ impl Layers {
     }
 }
 
-impl<T: Real> Colors<'_, T> {
-    /// Sorts a layer that starts at a place by color; each dof gets the first color that no earlier coupled dof has.
-    fn sort(&mut self, start: usize, layer: &mut [u32], places: &mut [u32]) {
-        let own = start..start + layer.len();
-        for &dof in layer.iter() {
-            let mut taken = 0_u64;
-            let dof = dof as usize;
-            for (&other, &value) in self.matrix.row_idx_of_col_raw(dof).iter().zip(self.matrix.val_of_col(dof)) {
-                let color = self.colors[other];
-                if value != T::zero() && color < 64 && own.contains(&(places[other] as usize)) {
-                    taken |= 1 << color;
-                }
-            }
-            // If too many dofs are coupled to each other, several share the last color.
-            self.colors[dof] = u8::try_from(taken.trailing_ones().min(63)).unwrap_or(0);
-        }
-        layer.sort_by_key(|&dof| self.colors[dof as usize]);
-        for (place, &dof) in own.zip(layer.iter()) {
-            places[dof as usize] = u32::try_from(place).unwrap_or(NONE);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,12 +115,12 @@ mod tests {
         let entries: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
         let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(8, 8, &entries).unwrap();
         let layers = Layers::around(&[2, 7], matrix.as_ref(), &[7]).unwrap();
-        assert_eq!(layers.order(), [2, 0, 4, 6, 1, 5, 3]);
+        assert_eq!(layers.order(), [2, 0, 4, 6, 1, 3, 5]);
         assert_eq!((layers.first(), layers.place(6), layers.place(7) > 7), (1, 3, true));
         assert_eq!([layers.beyond(0, 1), layers.beyond(0, 2), layers.beyond(0, 3)], [[1, 3], [3, 4], [4, 4]]);
         // The other chain has no layers.
         assert_eq!([layers.beyond(5, 1), layers.beyond(3, 9)], [[7, 7], [4, 4]]);
         let whole = Layers::around(&[], matrix.as_ref(), &[7]).unwrap();
-        assert_eq!((whole.order(), whole.first(), whole.connected(0)), (&[0, 1, 4, 5, 2, 3, 6][..], 7, 7));
+        assert_eq!((whole.order(), whole.first(), whole.connected(0)), (&[0, 1, 2, 3, 4, 5, 6][..], 7, 7));
     }
 }
