@@ -47,8 +47,8 @@ fn steps_do_not_allocate() {
     a_surface_against_itself();
 }
 
-/// A bar on a rough bed that comes to rest, and a block that is thrown along a rough floor: once all contacts have
-/// pressed, stuck and slid nothing is allocated.
+/// A bar on a rough bed that comes to rest, and a block that is thrown along a rough floor: no memory is
+/// allocated once all contacts have pressed, stuck and slid.
 fn friction() {
     let bed = Bed::new(30);
     for scheme in all().into_iter().filter(Listed::takes_multipliers) {
@@ -352,7 +352,7 @@ fn correctors() {
     }
 }
 
-/// A block with a consistent mass that bounces: once all contacts have pressed and opened nothing is allocated.
+/// A block with a consistent mass that bounces: it allocates only until all contacts have pressed and opened.
 fn consistent_masses() {
     let solid = Solid::block([1.0; 3], [5; 3], Material { young: 1e3, poisson: 0.3, density: 1.0 });
     let mass = solid.lumped_mass::<f64>();

@@ -99,8 +99,8 @@ impl<T: Real> AffineRows<T> {
     }
 }
 
-/// The rows of a search, linearized: for each row its identity, what is known at its point of contact, and the offset
-/// of the surfaces.
+/// The linearized rows of a search. Each row has an identity, the data of its point of contact, and the offset of the
+/// surfaces.
 #[derive(Debug)]
 pub(super) struct Rows<T, Identity, Spot> {
     pub(super) affine: AffineRows<T>,

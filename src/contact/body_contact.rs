@@ -19,7 +19,8 @@ use crate::real::Real;
 /// 3. [`EdgeToEdge`], in three dimensions.
 ///
 /// For a surface against itself the constraints are [`NodeToFacet::of_itself`], for corners and faces, and in three
-/// dimensions [`EdgeToEdge::of_itself`].
+/// dimensions [`EdgeToEdge::of_itself`]. Where edges have rows, a node that is outside an edge and behind the facet
+/// that ends there has none.
 ///
 /// Smooth bodies have the first one only, without extra cost. Where a face with its edges lies on a face there are
 /// more rows than independent gaps. Then the multipliers have the least norm, and only their sums are meaningful.

@@ -106,7 +106,7 @@ impl<T: Real> Checkpoint<T> {
         }
     }
 
-    /// All vectors with one entry per dof, in a fixed order; those that nothing reads are empty.
+    /// All vectors with one entry per dof, in a fixed order. Vectors of motions that nothing reads are empty.
     fn vectors(&mut self) -> impl Iterator<Item = &mut Vec<T>> {
         let (state, history) = (&mut self.state, &mut self.history);
         let motions = std::iter::once(&mut state.motion).chain(&mut history.slots).chain(history.computed.all());

@@ -565,7 +565,7 @@ fn limits_are_kept_and_told() {
     }
 }
 
-/// A solver keeps its memory: what it has solved once it solves again without an allocation.
+/// A solver keeps its memory: it solves a problem for the second time without an allocation.
 #[test]
 fn solving_again_allocates_nothing() {
     let (problem, _) = random(&mut Congruential(11), 25, 18, 40, 0.2);

@@ -18,7 +18,7 @@ struct Row {
     is_tie: bool,
 }
 
-/// Bodies, the dofs of one behind those of the other.
+/// Several bodies in one model; the dofs of each body follow those of the body before.
 pub(crate) struct Many {
     stiffness: SparseColMat<usize, f64>,
     mass: SparseColMat<usize, f64>,
