@@ -50,6 +50,12 @@ pub(crate) fn node_size(pattern: SymbolicSparseColMatRef<'_, usize>) -> usize {
     [3, 2].into_iter().find(fits).unwrap_or(1)
 }
 
+/// Whether a dof couples with others. Prescribed dofs do not.
+pub(crate) fn is_coupled<T: Real>(a: SparseColMatRef<'_, usize, T>, dof: usize) -> bool {
+    let mut entries = a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof));
+    entries.any(|(&other, &value)| other != dof && value != T::zero())
+}
+
 impl Aggregates {
     /// Aggregates of the nodes of a symmetric matrix, which have `size` dofs each. A node of which one dof is
     /// `excluded`, or does not couple with others, as if it is prescribed, belongs to none.
@@ -59,15 +65,11 @@ impl Aggregates {
         excluded: impl Iterator<Item = usize>,
     ) -> Result<Self> {
         let (pattern, nodes) = (a.symbolic(), a.ncols() / size);
-        let couples = |dof: usize| {
-            let mut entries = a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof));
-            entries.any(|(&other, &value)| other != dof && value != T::zero())
-        };
         let near = |node: usize| neighbors(pattern, size, node);
         let mut of_node: Vec<u32> = memory::reserve(nodes, 1, WHAT)?;
         of_node.resize(nodes, NONE);
         let mut may: Vec<bool> = memory::reserve(nodes, 1, WHAT)?;
-        may.extend((0..nodes).map(|node| (node * size..(node + 1) * size).all(couples)));
+        may.extend((0..nodes).map(|node| (node * size..(node + 1) * size).all(|dof| is_coupled(a, dof))));
         excluded.for_each(|dof| may[dof / size] = false);
         // All nodes at most two away from a node, if none of them has an aggregate.
         let mut count = 0;

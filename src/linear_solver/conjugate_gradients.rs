@@ -243,7 +243,8 @@ impl<T: Real> LinearSolver<T> for ConjugateGradients {
 
 impl<T: Real> Matrix<T> {
     /// Copies the entries of a symmetric matrix. Returns an estimate of the condition number of the scaled matrix: the
-    /// stiffest motion has twice the sum of the diagonal, a translation the sum of all entries.
+    /// stiffest motion has twice the sum of the diagonal, a translation the sum of all entries. Rows of prescribed dofs
+    /// have a diagonal of one in any unit, and do not count.
     fn fill(&mut self, a: SparseColMatRef<'_, usize, T>) -> Result<f64> {
         let Self { size, parts, pointers, columns, values, scaling, .. } = self;
         let size = *size;
@@ -254,9 +255,10 @@ impl<T: Real> Matrix<T> {
             let (row, place) = (parts.place(dof / size), dof % size);
             let own: Range<usize> = pointers[row]..pointers[row + 1];
             let mut at = own.start;
+            let is_coupled = coarse_space::is_coupled(a, dof);
             for (&other, &value) in a.row_idx_of_col_raw(dof).iter().zip(a.val_of_col(dof)) {
                 let (column, within) = (parts.place(other / size), other % size);
-                if within == place {
+                if is_coupled && within == place {
                     all += value;
                     diagonal += if other == dof { value } else { T::zero() };
                 }

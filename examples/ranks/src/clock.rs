@@ -80,7 +80,6 @@ impl Clock {
     }
 
     /// Iterations of a solve.
-    #[cfg(feature = "petsc")]
     pub fn iterated(&self, iterations: usize) {
         self.0.lock().unwrap().spent.iterations += iterations as f64;
     }
