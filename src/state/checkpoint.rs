@@ -3,6 +3,7 @@
 use super::history::History;
 use super::record::{Format, HistoryRecord, Record, ScalarName, StateRecord};
 use super::{Motion, State};
+use crate::error::{Error, Result};
 use crate::real::Real;
 use serde::{Deserialize, Serialize};
 
@@ -94,5 +95,15 @@ impl<T: Real> Checkpoint<T> {
     /// Name of the scheme that created it.
     pub fn scheme(&self) -> &str {
         &self.history.scheme
+    }
+}
+
+impl<T: Real> TryFrom<Record<T>> for Checkpoint<T> {
+    type Error = Error;
+
+    fn try_from(mut read: Record<T>) -> Result<Self> {
+        read.check()?;
+        let Record { format, scalar, rows, state, history } = read;
+        Ok(Self { format, scalar, rows, state, history })
     }
 }

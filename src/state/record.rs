@@ -1,6 +1,5 @@
 //! The content of a checkpoint file, in this order, and its checks. Any change here requires a new [`FORMAT`].
 
-use super::checkpoint::Checkpoint;
 use super::clock::{Clock, Pace};
 use super::contacts::{ContactState, Names};
 use super::history::{ComputedMotions, History};
@@ -25,13 +24,13 @@ const KIND: &str = "contact-dynamics checkpoint";
 #[serde(bound = "T: Real", expecting = "a checkpoint of contact-dynamics")]
 pub(super) struct Record<T> {
     // These two come first, so that other files are rejected by them, not by missing fields.
-    format: Format,
-    scalar: ScalarName<T>,
-    rows: u32,
+    pub(super) format: Format,
+    pub(super) scalar: ScalarName<T>,
+    pub(super) rows: u32,
     #[serde(with = "StateRecord")]
-    state: State<T>,
+    pub(super) state: State<T>,
     #[serde(with = "HistoryRecord")]
-    history: History<T>,
+    pub(super) history: History<T>,
 }
 
 // The fields of public types; these types themselves are not read from files, because nothing would check them.
@@ -152,14 +151,11 @@ impl TryFrom<Vec<(f64, usize)>> for Tangents {
     }
 }
 
-impl<T: Real> TryFrom<Record<T>> for Checkpoint<T> {
-    type Error = Error;
-
-    fn try_from(read: Record<T>) -> Result<Self> {
-        let Record { format, scalar, rows, state, mut history } = read;
-        check_state(&state)?;
-        check_history(&mut history, state.motion.u.len(), state.is_shifted())?;
-        Ok(Self { format, scalar, rows, state, history })
+impl<T: Real> Record<T> {
+    /// Rejects a record whose lists do not fit together, or with values that no run produces.
+    pub(super) fn check(&mut self) -> Result<()> {
+        check_state(&self.state)?;
+        check_history(&mut self.history, self.state.motion.u.len(), self.state.is_shifted())
     }
 }
 

@@ -288,6 +288,9 @@ impl Ground<'_> {
     pub(crate) fn is_beside(&self, stand: &Stand) -> bool {
         /// Depth as a share of the facet.
         const PENETRATION: f64 = 1e-4;
+        if stand.is_inside() {
+            return false;
+        }
         let Stand { facet, location, ref weights, normal, distance, factor, offset, .. } = *stand;
         let arm = normal.map(|x| distance * x);
         let shape = self.surface.facets()[facet].shape(self.positions);
