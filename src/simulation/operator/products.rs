@@ -32,6 +32,8 @@ pub(super) struct Products<T> {
     cg: ProjectedCg<T>,
     /// The forces of the problem solved last, on the interface; empty if it was not solved.
     answered: Vec<T>,
+    /// Whether a problem of this stage was not solved: the next ones differ little.
+    has_failed: bool,
     /// Whether all this belongs to the present matrix.
     pub(super) is_current: bool,
 }
@@ -69,6 +71,7 @@ impl<T: Real> Products<T> {
             deflates: false,
             cg: ProjectedCg::default(),
             answered: Vec::new(),
+            has_failed: false,
             is_current: false,
         })
     }
@@ -162,6 +165,9 @@ impl<T: Real> Products<T> {
         if !self.answered.is_empty() {
             return Some(usize::MAX);
         }
+        if self.has_failed {
+            return None;
+        }
         let of_one = self.entries + 8.0 * self.dofs + (8 * entries) as f64;
         let expected = self.expected as f64 * digits(residual) / digits(projected_residual::<T>().value());
         let most = if self.deflates { usize::MAX } else { MANY_PRODUCTS };
@@ -180,6 +186,7 @@ impl<T: Real> Products<T> {
     pub(super) fn begin(&mut self) {
         self.cg.begin();
         self.answered.clear();
+        self.has_failed = false;
     }
 
     /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves their
@@ -193,13 +200,14 @@ impl<T: Real> Products<T> {
         (affordable, residual): (usize, f64),
         forces: &mut [T],
     ) -> Result<Outcome> {
-        let Self { product, inverse, expected, space, deflates, cg, answered, .. } = self;
+        let Self { product, inverse, expected, space, deflates, cg, answered, has_failed, .. } = self;
         answered.clear();
         let mut body = Matrix { product, space: space.as_mut().filter(|_| *deflates), a, dofs, together };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
         let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
         let outcome = cg.solve(&mut problem, multipliers)?;
+        *has_failed = !outcome.is_solved;
         if outcome.is_solved {
             forces.fill(T::zero());
             for (&row, &lambda) in data.rows.iter().zip(&*multipliers) {
