@@ -32,10 +32,17 @@ pub(super) struct Products<T> {
     cg: ProjectedCg<T>,
     /// The forces of the problem solved last, on the interface; empty if it was not solved.
     answered: Vec<T>,
-    /// Whether a problem of this stage was not solved: the next ones differ little.
-    has_failed: bool,
+    tried: Tried,
     /// Whether all this belongs to the present matrix.
     pub(super) is_current: bool,
+}
+
+/// What became of the last problem of a stage. The next ones differ little.
+#[derive(Clone, Copy, Debug)]
+enum Tried {
+    Nothing,
+    Solved,
+    Failed,
 }
 
 /// How often statuses may be decided, and how many products may be taken over those expected, before W is formed.
@@ -71,7 +78,7 @@ impl<T: Real> Products<T> {
             deflates: false,
             cg: ProjectedCg::default(),
             answered: Vec::new(),
-            has_failed: false,
+            tried: Tried::Nothing,
             is_current: false,
         })
     }
@@ -160,13 +167,12 @@ impl<T: Real> Products<T> {
     }
 
     /// Products to be tried for a problem to a residual, of rows with so many entries, if the work with W (in
-    /// multiplications) is no less. A stage of which a problem was solved so goes on.
+    /// multiplications) is no less. A stage goes on as its last problem has ended.
     pub(super) fn affordable(&self, entries: usize, residual: f64, with_w: f64) -> Option<usize> {
-        if !self.answered.is_empty() {
-            return Some(usize::MAX);
-        }
-        if self.has_failed {
-            return None;
+        match self.tried {
+            Tried::Solved => return Some(usize::MAX),
+            Tried::Failed => return None,
+            Tried::Nothing => {}
         }
         let of_one = self.entries + 8.0 * self.dofs + (8 * entries) as f64;
         let expected = self.expected as f64 * digits(residual) / digits(projected_residual::<T>().value());
@@ -186,7 +192,7 @@ impl<T: Real> Products<T> {
     pub(super) fn begin(&mut self) {
         self.cg.begin();
         self.answered.clear();
-        self.has_failed = false;
+        self.tried = Tried::Nothing;
     }
 
     /// Solves for the multipliers of some rows, to a residual, with at most `affordable` products, and leaves their
@@ -200,14 +206,14 @@ impl<T: Real> Products<T> {
         (affordable, residual): (usize, f64),
         forces: &mut [T],
     ) -> Result<Outcome> {
-        let Self { product, inverse, expected, space, deflates, cg, answered, has_failed, .. } = self;
+        let Self { product, inverse, expected, space, deflates, cg, answered, tried, .. } = self;
         answered.clear();
         let mut body = Matrix { product, space: space.as_mut().filter(|_| *deflates), a, dofs, together };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
         let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
         let outcome = cg.solve(&mut problem, multipliers)?;
-        *has_failed = !outcome.is_solved;
+        *tried = if outcome.is_solved { Tried::Solved } else { Tried::Failed };
         if outcome.is_solved {
             forces.fill(T::zero());
             for (&row, &lambda) in data.rows.iter().zip(&*multipliers) {
