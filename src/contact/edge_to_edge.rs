@@ -64,8 +64,8 @@ use rows::Rows;
 /// # Known failure
 ///
 /// - An open rim is not an edge, because the surface behind it is unknown. Give the whole surface of a body.
-/// - Concave edges, and edges with a smaller angle, have rows only from nodes and facets. Edges are those of the
-///   reference configuration: an edge of the other body may cross a side within a face that bends.
+/// - Concave edges, and edges with a smaller angle, have rows only from nodes and facets. Angles are taken in the
+///   reference configuration: where a face bends in a run, an edge of the other body may cross a side within it.
 /// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is a new contact:
 ///   correctors and friction laws have no history of it.
 /// - Where an edge slides from one side of its mesh to the next it loses some of its speed along it, less than 0.5 %

@@ -208,13 +208,14 @@ impl<T: Real> Products<T> {
     ) -> Result<Outcome> {
         let Self { product, inverse, expected, space, deflates, cg, answered, tried, .. } = self;
         answered.clear();
+        *tried = Tried::Failed;
         let mut body = Matrix { product, space: space.as_mut().filter(|_| *deflates), a, dofs, together };
         let products = expected.saturating_mul(PATIENCE).saturating_add(LOOKS).min(affordable);
         let patience = Patience { products, looks: LOOKS, residual };
         let mut problem = SparseProblem { body: &mut body, inverse, data, patience };
         let outcome = cg.solve(&mut problem, multipliers)?;
-        *tried = if outcome.is_solved { Tried::Solved } else { Tried::Failed };
         if outcome.is_solved {
+            *tried = Tried::Solved;
             forces.fill(T::zero());
             for (&row, &lambda) in data.rows.iter().zip(&*multipliers) {
                 data.g.interface_scatter(row, lambda, forces);
