@@ -50,11 +50,17 @@ impl<T: Real> DenseCholesky<T> {
     /// there.
     pub(crate) fn factorize(&mut self, size: usize, entry: impl Fn(usize, usize) -> T) -> Result<(), usize> {
         let fill = |i: usize, row: &mut [T]| row.iter_mut().enumerate().for_each(|(j, x)| *x = entry(i, j));
-        self.factorize_rows(size, fill)
+        self.factorize_rows(size, 0.0, fill)
     }
 
-    /// The same with `fill(i, row)`, which writes the entries j ≤ i of row i.
-    pub(crate) fn factorize_rows(&mut self, size: usize, mut fill: impl FnMut(usize, &mut [T])) -> Result<(), usize> {
+    /// The same with `fill(i, row)`, which writes the entries j ≤ i of row i. A row is dependent also if its pivot is
+    /// less than the share `least` of its diagonal entry.
+    pub(crate) fn factorize_rows(
+        &mut self,
+        size: usize,
+        least: f64,
+        mut fill: impl FnMut(usize, &mut [T]),
+    ) -> Result<(), usize> {
         let Self { l, first, diagonal, independent, kind, reduced, scratch, .. } = self;
         self.size = size;
         l.clear();
@@ -73,7 +79,7 @@ impl<T: Real> DenseCholesky<T> {
                 return Err(i);
             }
         }
-        let dependent = rounding(T::of(size as f64));
+        let dependent = rounding(T::of(size as f64)).max(T::of(least));
         let suspect = share_of_rounding::<T>().max(dependent);
         independent.clear();
         if size >= BLOCKED && profile > size * size / 4 {

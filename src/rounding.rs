@@ -64,6 +64,11 @@ pub(crate) fn split_of_root(multiplicity: usize) -> f64 {
 
 // Contact solvers.
 
+/// A closed row is a combination of others if these leave less than this share of its S_ii: rows of the same node that
+/// differ by a milliradian. As equations of their own such rows would ask for a thousand times the accelerations by
+/// which they differ (theory, section 5.4).
+pub(crate) const ONE_ROW: f64 = 1e-6;
+
 /// The share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ: the rounding of 64 terms.
 pub(crate) fn asymmetry<T: Float>() -> T {
     rounding(number(64.0))

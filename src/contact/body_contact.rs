@@ -4,6 +4,7 @@ use super::surface::{Facet, Nodes, Surface};
 use super::{ContactConstraint, EdgeToEdge, Mortar, NodeToFacet, SurfaceSettings, surface_settings};
 use crate::error::Result;
 use crate::real::Real;
+use std::f64::consts::FRAC_PI_6;
 
 /// Contact of deforming bodies whose surfaces may have corners and edges: of two bodies ([`new`](Self::new)), or of
 /// any number of bodies, which may fold ([`of_itself`](Self::of_itself)). It makes the constraints for
@@ -16,7 +17,7 @@ use crate::real::Real;
 /// 1. [`Mortar`] of the whole surfaces;
 /// 2. [`NodeToFacet`] of the slave's nodes at sharp edges (in two dimensions: at sharp corners) with the master's
 ///    facets, and of the master's nodes with the slave's facets;
-/// 3. [`EdgeToEdge`], in three dimensions.
+/// 3. [`EdgeToEdge`], in three dimensions, if both bodies have sharp edges.
 ///
 /// For a surface against itself the constraints are [`NodeToFacet::of_itself`], for corners and faces, and in three
 /// dimensions [`EdgeToEdge::of_itself`]. Where edges have rows, a node that is outside an edge and behind the facet
@@ -165,7 +166,7 @@ impl<T: Real, const D: usize> BodyContact<T, D> {
     /// Checks the settings, and finds the sharp nodes.
     fn apply_settings(&mut self) -> Result<()> {
         self.settings.check(self.coordinates.len())?;
-        let angle = self.settings.edge_angle();
+        let angle = self.settings.sharp_angle(FRAC_PI_6);
         if self.is_of_itself {
             let nodes = Nodes::new(&self.coordinates, &self.dofs)?;
             let surface = Surface::of_facets(self.facets[0].iter().copied(), D, &nodes.coordinates)?;

@@ -2,12 +2,13 @@
 
 mod edges;
 mod lines;
+mod lists;
 mod pairs;
 mod passage;
 mod rows;
 
 use super::affine_rows::{SearchState, set_friction};
-use super::surface::{Facet, Material, Neighborhood, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
+use super::surface::{Facet, Material, Nodes, Offsets, Point, Surface, Vicinity, add_scaled};
 use super::{
     Candidates, ContactConstraint, Contacts, GapRates, Rates, Stride, SurfaceSettings, check_local, surface_settings,
 };
@@ -15,15 +16,20 @@ use crate::error::Result;
 use crate::real::Real;
 use edges::Edge;
 use lines::Crossing;
+use lists::Lists;
 use pairs::{LEAST_SINE, Pair};
 use rows::Rows;
+
+/// The angle (radians) from which a side is an edge, unless one is given.
+const LEAST_TURN: f64 = 0.01;
 
 /// Contact of the edges of two deforming surfaces in three dimensions, where they cross. It complements
 /// [`NodeToFacet`](super::NodeToFacet) of the same surfaces, which does not detect crossing edges, or is a part of a
 /// [`BodyContact`](super::BodyContact).
 ///
-/// Edges are the convex sides of facets around which a surface turns by more than an angle
-/// ([`sharp`](SurfaceSettings::sharp)).
+/// Edges are the sides of facets at which a surface is convex and turns by more than an angle
+/// ([`sharp`](SurfaceSettings::sharp)), as it lies at the search: also the sides within a face that bends.
+///
 /// The lines through an edge e of the first surface and an edge f of the second are closest at x_e and x_f. The pair
 /// is in contact, or near it, if these points are on the edges, and if the normal n = ±(t_e × t_f)/|t_e × t_f| is a
 /// normal of the second body at f, between the normals of the two facets beside f, and −n is a normal of the first
@@ -64,8 +70,8 @@ use rows::Rows;
 /// # Known failure
 ///
 /// - An open rim is not an edge, because the surface behind it is unknown. Give the whole surface of a body.
-/// - Concave edges, and edges with a smaller angle, have rows only from nodes and facets. Angles are taken in the
-///   reference configuration: where a face bends in a run, an edge of the other body may cross a side within it.
+/// - Concave edges, and edges with a smaller angle, have rows only from nodes and facets. Where a face folds within a
+///   step, its sides are edges from the next step on.
 /// - A row belongs to two sides of facets. A contact that slides along an edge onto its next side is a new contact:
 ///   correctors and friction laws have no history of it.
 /// - Where an edge slides from one side of its mesh to the next it loses some of its speed along it, less than 0.5 %
@@ -113,8 +119,7 @@ pub struct EdgeToEdge<T: Real> {
     /// The length of the shortest edge, in the reference configuration.
     finest: f64,
     settings: SurfaceSettings<T>,
-    /// Edges of the second surface near each edge of the first.
-    neighborhood: Neighborhood,
+    lists: Lists,
     /// Positions at the start and at the end of a step, by node.
     ends: [Vec<Point>; 2],
     rows: Rows<T>,
@@ -130,7 +135,7 @@ impl<T: Real> EdgeToEdge<T> {
     /// `coordinates` are the reference coordinates of all nodes of a mesh, and `dofs` the dofs of their
     /// displacements. Facets are triangles and quadrilaterals that list nodes by their index there, and their normals
     /// point out of the bodies ([`Facet`]). The two surfaces must not share a node. The law is [`ContactLaw::Rigid`]
-    /// by default, see [`with_law`](Self::with_law). A surface without edges, as of a ball, is accepted: it has no
+    /// by default, see [`with_law`](Self::with_law). A surface without edges, as a plane, is accepted: it has no
     /// candidates.
     ///
     /// # Errors
@@ -214,7 +219,7 @@ impl<T: Real> EdgeToEdge<T> {
             acts: Vec::new(),
             finest: f64::INFINITY,
             settings,
-            neighborhood: Neighborhood::default(),
+            lists: Lists::default(),
             rows: Rows::new(),
             found: Rows::new(),
         };
@@ -229,18 +234,17 @@ impl<T: Real> EdgeToEdge<T> {
         self.find_edges()
     }
 
-    /// The nodes of the edges of both surfaces, the smaller node of each edge first, in ascending order: features are
-    /// indices in the first list, candidates in the second.
+    /// The nodes of all sides that two facets of a surface share, the smaller node of each first, in ascending order:
+    /// features are indices in the first list, of the first surface, candidates in the second.
     pub fn edges(&self) -> [&[[usize; 2]]; 2] {
         self.ends_of.each_ref().map(Vec::as_slice)
     }
 
-    /// Finds the edges, and the dofs on which they act.
+    /// Finds the sides that may be edges, and the dofs on which they act.
     fn find_edges(&mut self) -> Result<()> {
-        let Self { nodes, surfaces, edges, settings, .. } = self;
-        let angle = settings.edge_angle();
+        let Self { nodes, surfaces, edges, .. } = self;
         for (edges, surface) in edges.iter_mut().zip(&*surfaces) {
-            *edges = Edge::of(surface, angle, &nodes.coordinates);
+            *edges = Edge::of(surface, &nodes.coordinates);
         }
         self.ends_of = edges.each_ref().map(|edges| edges.iter().map(|edge| edge.nodes).collect());
         let mut bodies = [Vec::new(), Vec::new()];
@@ -268,36 +272,31 @@ impl<T: Real> EdgeToEdge<T> {
         Sides { edges, surfaces, vicinity, offsets: vicinity.thickness.at(t) }
     }
 
-    /// Makes lists of near edges valid for the current positions, and for distances up to `range`.
+    /// Makes the lists complete for distances up to `range`.
     fn update_lists(&mut self, range: f64) {
-        let motions = self.vicinity.reach.motions(&self.nodes);
-        let Some(listed) = self.vicinity.reach.renew(&motions, range, &self.nodes.positions) else { return };
-        let [one, other] =
-            self.edges.each_ref().map(|edges| edges.iter().map(|edge| edge.bounds(&self.nodes.positions)));
-        self.neighborhood.build(one, other, listed);
+        let Self { nodes, edges, surfaces, vicinity, lists, settings, .. } = self;
+        lists.update((edges, surfaces), settings.sharp_angle(LEAST_TURN), (nodes, vicinity), range);
     }
 
     fn find_rows(&mut self, &SearchState { t, u, v, ahead }: &SearchState<'_, T>) {
-        let Self { nodes, edges, surfaces, vicinity, neighborhood, found, .. } = self;
+        let Self { nodes, edges, surfaces, vicinity, lists, found, .. } = self;
         let Vicinity { thickness, reach, .. } = &*vicinity;
         let sides = Sides { edges, surfaces, vicinity, offsets: thickness.at(t) };
         let [thick, growth] = thickness.sizes(nodes.bodies(), [t, t + ahead]);
         let at = |node: usize| nodes.positions[node];
         let velocity = |node: usize| nodes.vector(node, v);
-        for (first, edge) in edges[0].iter().enumerate() {
-            let bounds = edge.bounds(&nodes.positions);
-            for &second in neighborhood.of(first) {
-                let Some(pair) = sides.meeting([first, second]) else { continue };
-                let way = growth + ahead * pair.way(&velocity);
-                if !bounds.inflated(reach.least() + thick + way).intersects(&pair.edges[1].bounds(&nodes.positions)) {
-                    continue;
-                }
-                if let Some(crossing) = pair.near(reach.least(), way, &at) {
-                    let names = (pair.nodes(), |node| nodes.places(node));
-                    let row = pair.row(&crossing, &at);
-                    let round = (pair.radius(&crossing), pair.offsets.factor);
-                    found.push(([first, second], crossing), round, row, names, u);
-                }
+        for index in lists.pairs() {
+            let Some(pair) = sides.meeting(index) else { continue };
+            let way = growth + ahead * pair.way(&velocity);
+            let [one, other] = pair.edges.map(|edge| edge.bounds(&nodes.positions));
+            if !one.inflated(reach.least() + thick + way).intersects(&other) {
+                continue;
+            }
+            if let Some(crossing) = pair.near(reach.least(), way, &at) {
+                let names = (pair.nodes(), |node| nodes.places(node));
+                let row = pair.row(&crossing, &at);
+                let round = (pair.radius(&crossing), pair.offsets.factor);
+                found.push((index, crossing), round, row, names, u);
             }
         }
     }
@@ -376,11 +375,12 @@ impl<T: Real> ContactConstraint<T> for EdgeToEdge<T> {
         let boxes = self.nodes.move_to(u)?;
         let speeds = self.nodes.boxes_of(|node| self.nodes.vector(node, v));
         self.found.clear();
+        self.lists.restart();
         if self.edges.iter().all(|edges| !edges.is_empty()) {
-            let Self { vicinity, surfaces: [one, other], nodes, .. } = self;
-            vicinity.prepare(&[one, other], nodes.bodies(), &nodes.coordinates);
-            let [thick, growth] = self.vicinity.thickness.sizes(self.nodes.bodies(), [t, t + ahead]);
-            let range = self.vicinity.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
+            let Self { vicinity, surfaces, nodes, .. } = self;
+            vicinity.prepare(&surfaces.each_ref(), nodes.bodies(), &nodes.coordinates);
+            let [thick, growth] = vicinity.thickness.sizes(nodes.bodies(), [t, t + ahead]);
+            let range = vicinity.reach.least() + thick + growth + ahead * speeds[0].farthest(&speeds[1]);
             if boxes[0].inflated(range).intersects(&boxes[1]) {
                 self.update_lists(range);
                 self.find_rows(&SearchState { t, u, v, ahead });

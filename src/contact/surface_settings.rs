@@ -135,13 +135,14 @@ impl<T: Real> SurfaceSettings<T> {
         self
     }
 
-    /// The angle (radians, from 0 to π) from which a convex side is an edge of [`EdgeToEdge`], and a side (in two
-    /// dimensions a node) is sharp for [`BodyContact`]: the angle between the normals of its facets in the reference
-    /// configuration; 30° by default. Without effect for the other constraints.
+    /// The angle (radians, from 0 to π) between the normals of two facets from which the convex side between them
+    /// counts as sharp. It is used in two places, each with its own default; without effect for other constraints:
     ///
-    /// Sides with smaller angles are left to nodes on facets. Two edges of length l that cross at their middles then
-    /// penetrate by at most ½ l tan(½ `angle`) before a node touches: by 13 % of an element at 30°. With a smaller
-    /// angle the sides of a mesh on a curved surface become edges, and all of them are searched.
+    /// - [`EdgeToEdge`]: sides that are edges now, as the surface lies at each search; 0.01 (0.6°) by default. Other
+    ///   sides are left to nodes on facets. Two edges of length l that cross at their middles then penetrate by at
+    ///   most ½ l tan(½ `angle`) before a node touches: by 0.25 % of an element at 0.01, by 13 % at 30°.
+    /// - [`BodyContact`]: sides (in two dimensions nodes) that are sharp in the reference configuration; 30° by
+    ///   default. They decide which nodes have rows of their own, and whether edges are needed at all.
     #[must_use]
     pub fn sharp(mut self, angle: f64) -> Self {
         self.sharp = Some(angle);
@@ -198,9 +199,9 @@ impl<T: Real> SurfaceSettings<T> {
         self.friction.unwrap_or(0.0)
     }
 
-    /// The angle from which a convex side is an edge: 30° unless it is given.
-    pub(super) fn edge_angle(&self) -> f64 {
-        self.sharp.unwrap_or(std::f64::consts::FRAC_PI_6)
+    /// The angle from which a convex side is an edge, or this one unless it is given.
+    pub(super) fn sharp_angle(&self, usual: f64) -> f64 {
+        self.sharp.unwrap_or(usual)
     }
 }
 

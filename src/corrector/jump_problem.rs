@@ -7,7 +7,7 @@ use crate::contact_solver::{AdmissibleSet, ContactFailure, ContactProblem, Conta
 use crate::dense::DenseCholesky;
 use crate::error::{Error, Result};
 use crate::real::Real;
-use crate::rounding::{half_digits, rounding};
+use crate::rounding::{ONE_ROW, half_digits, rounding};
 
 /// A contact of the problem.
 #[derive(Clone, Copy, Debug)]
@@ -403,7 +403,9 @@ impl<T: Real> Group<T> {
         let slides = !friction.is_empty();
         let friction = |i: usize, j: usize| friction.get(i * size + j).copied().unwrap_or(T::zero());
         let failure = |iterations| move |row| ContactFailure::NotConverged { iterations, row, residual: T::nan() };
-        factor.factorize(size, |i, j| delassus[i * size + j] - friction(i, j)).map_err(failure(0))?;
+        let entry = |i: usize, j: usize| delassus[i * size + j] - friction(i, j);
+        let fill = |i: usize, row: &mut [T]| row.iter_mut().enumerate().for_each(|(j, x)| *x = entry(i, j));
+        factor.factorize_rows(size, ONE_ROW, fill).map_err(failure(0))?;
         multipliers.fill(T::zero());
         next.resize(size, T::zero());
         for _ in 0..PASSES {

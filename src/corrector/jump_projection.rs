@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::mass::{ConsistentInverse, InverseMass, Mass};
 use crate::memory;
 use crate::real::Real;
+use crate::rounding::ONE_ROW;
 use crate::sparse;
 
 /// The projection behind the λ_v/λ_a correction, usable on a host's own vectors.
@@ -219,7 +220,8 @@ impl<T: Real> JumpProjection<T> {
                     place.and_then(|j| row.get_mut(j)).into_iter().for_each(|entry| *entry = product);
                 });
             };
-            result = result.and(factors[used].factorize_rows(own.len(), fill).map_err(|i| refuse(rows[own[i]])));
+            result =
+                result.and(factors[used].factorize_rows(own.len(), ONE_ROW, fill).map_err(|i| refuse(rows[own[i]])));
             used += 1;
         }
         (self.roots, self.factors, self.products) = (roots, factors, products);

@@ -427,6 +427,43 @@ fn edges_that_may_come_to_meet_have_rows() {
     }
 }
 
+/// Two triangles in a plane below a ridge that crosses their common side. The side has a row when the plane folds
+/// there, by more than the given angle, and none when it is flat again or folds the other way.
+#[test]
+fn a_side_becomes_an_edge_where_its_surface_folds() {
+    let coordinates = [
+        [-1.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.1],
+        [0.0, 1.0, 0.1],
+        [-1.0, 0.0, 1.1],
+        [1.0, 0.0, 1.1],
+    ];
+    let (plane, ridge) = ([[0, 1, 3], [1, 0, 2]], [[4, 5, 7], [5, 4, 6]]);
+    let contact = || EdgeToEdge::new(&coordinates, &Pair::dofs(), ridge, plane).unwrap();
+    let wide = contact().with(SurfaceSettings::new().sharp(0.4)).unwrap();
+    for (mut contact, least) in [(contact(), 0.01), (wide, 0.4)] {
+        for angle in [0.0, 0.5, 0.5 * least, 1.01 * least, -0.5, 1.5 * least, 0.0_f64] {
+            // Both triangles turn about their common side.
+            let mut u = [0.0; 24];
+            for (node, side) in [(2, -1.0), (3, 1.0)] {
+                u[3 * node + 1] = side * ((0.5 * angle).cos() - 1.0);
+                u[3 * node + 2] = -(0.5 * angle).sin();
+            }
+            contact.search_on(0.0, &u, &[0.0; 24], 0.0).unwrap();
+            let found = Contacts::of(&contact);
+            assert_eq!(found.len(), usize::from(angle > least), "{angle} of {least}");
+            if angle > least {
+                let mut gap = [0.0];
+                contact.gap(0.0, &u, &mut gap);
+                assert!((gap[0] - 0.1_f64).abs() < 1e-14 && found.normal(0) == Some([0.0, 0.0, 1.0]));
+            }
+        }
+    }
+}
+
 #[test]
 fn absurd_input_is_refused() {
     let pair = Pair::new(1.0, [0.5, 0.5], 0.1);
@@ -445,12 +482,9 @@ fn absurd_input_is_refused() {
     assert!(matches!(contact, Err(Error::Incompatible { .. })));
     let contact = EdgeToEdge::new(&pair.nodes, &Pair::dofs(), [[0, 1]], other);
     assert!(matches!(contact, Err(Error::Dimension { .. })));
-    // All six edges of a tetrahedron turn by more than 60 degrees here; none by more than 180.
-    assert_eq!(pair.contact::<f64>().edges().map(<[_]>::len), [6, 6]);
-    assert_eq!(
-        pair.contact::<f64>().with(SurfaceSettings::new().sharp(std::f64::consts::PI)).unwrap().edges().map(<[_]>::len),
-        [0, 0]
-    );
+    // No edge turns by more than 180 degrees.
+    let flat = SurfaceSettings::new().sharp(std::f64::consts::PI);
+    assert!(Pair::rows(&mut pair.contact::<f64>().with(flat).unwrap()).is_empty());
     // Trial states that are not finite: an error where a step begins, gaps that say so within.
     let mut contact = pair.contact::<f64>();
     contact.search_on(0.0, &[0.0; 24], &[0.0; 24], 0.0).unwrap();

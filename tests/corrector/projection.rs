@@ -32,3 +32,32 @@ fn contacts_with_a_prescribed_dof_in_common() {
         }
     }
 }
+
+/// A node on two slopes at a small angle to each other, whose accelerations differ. Slopes within a milliradian are
+/// one: the node keeps the mean of both. Others are two, and the edge between them moves at the rate at which both
+/// advance, however far that is along them.
+#[test]
+fn rows_that_are_nearly_the_same_are_one() {
+    for (angle, are_one) in [(1e-9, true), (1e-6, true), (5e-4, true), (2e-3, false), (0.1, false)] {
+        for order in [[0, 1], [1, 0]] {
+            let mut g = ContactJacobian::default();
+            let slopes: [f64; 2] = [-0.5 * angle, 0.5 * angle];
+            for k in order {
+                g.push(&[(0, slopes[k].cos()), (1, slopes[k].sin())]);
+            }
+            let targets = order.map(|k| [1.0, 3.0][k]);
+            let mut projection = JumpProjection::new(Mass::Lumped(&[2.0; 2]), &[]).unwrap();
+            projection.close(&g, &[0, 1]).unwrap();
+            let (mut a, mut forces) = ([0.0_f64; 2], [0.0; 2]);
+            projection.remove_jump(&g, &targets, &mut a, &mut forces).unwrap();
+            // Along and across the mean of the slopes.
+            let exact = match are_one {
+                true => [2.0, 0.0],
+                false => [2.0 / (0.5 * angle).cos(), 1.0 / (0.5 * angle).sin()],
+            };
+            let error = a.iter().zip(exact).map(|(a, exact)| (a - exact).abs() / exact.max(1.0));
+            let error = error.fold(0.0, f64::max);
+            assert!(error < if are_one { 2.0 * angle } else { 1e-9 }, "{angle:e} {order:?}: {a:?} for {exact:?}");
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use crate::contact::surface::{Bounds, Facet, Point, Shape, Surface, add_scaled, cross, dot, norm, sub, unit};
 use crate::rounding::ROUNDED_SHARE;
 
-/// A side that two facets share.
+/// A side that two facets share; an edge of the body where the surface turns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
     /// Its two nodes, the smaller one first.
@@ -40,21 +40,25 @@ impl Wedge {
 }
 
 impl Edge {
-    /// The convex edges of a surface around which it turns by more than an angle, in the order of their nodes.
-    pub(super) fn of(surface: &Surface, angle: f64, coordinates: &[Point]) -> Vec<Self> {
+    /// The sides of a surface that two facets share, in the order of their nodes.
+    pub(super) fn of(surface: &Surface, coordinates: &[Point]) -> Vec<Self> {
         let mut edges = Vec::new();
         for (facet, nodes) in surface.facets().iter().map(Facet::nodes).enumerate() {
             for (side, &first) in nodes.iter().enumerate() {
                 let second = nodes[(side + 1) % nodes.len()];
                 let Some(across) = surface.neighbor(facet, side).filter(|_| first < second) else { continue };
                 let length = norm(sub(coordinates[second], coordinates[first]));
-                if surface.turn(facet, side, coordinates).is_some_and(|turn| turn > angle) {
-                    edges.push(Self { nodes: [first, second], length, sides: [(facet, side), across] });
-                }
+                edges.push(Self { nodes: [first, second], length, sides: [(facet, side), across] });
             }
         }
         edges.sort_unstable_by_key(|edge| edge.nodes);
         edges
+    }
+
+    /// Whether the surface is convex there, and turns by more than an angle, with the nodes at these positions.
+    pub(super) fn is_sharp(&self, surface: &Surface, angle: f64, positions: &[Point]) -> bool {
+        let [(facet, side), _] = self.sides;
+        surface.turn(facet, side, positions).is_some_and(|turn| turn > angle)
     }
 
     pub(super) fn facets(&self) -> [usize; 2] {

@@ -19,16 +19,18 @@ impl<T: Real> EdgeToEdge<T> {
         if self.edges.iter().any(Vec::is_empty) || longest <= FINE * self.finest {
             return Ok(());
         }
+        // They are complete already unless the edges were faster than their velocities at the search.
+        self.update_lists(longest);
         let mut ends = std::mem::take(&mut self.ends);
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        let result = self.check_paths(step, longest, &ends);
+        let result = self.check_paths(step, &ends);
         self.ends = ends;
         result
     }
 
-    fn check_paths(&self, step: &Stride<'_, T>, longest: f64, ends: &[Vec<Point>; 2]) -> Result<()> {
+    fn check_paths(&self, step: &Stride<'_, T>, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
         for (row, &index) in self.rows.identities.iter().enumerate() {
             if let Err((what, path, gap)) = self.check_row(row, step, index, (&start, &end)) {
@@ -36,27 +38,17 @@ impl<T: Real> EdgeToEdge<T> {
             }
         }
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
-        let others = swept(&self.nodes.bodies()[1]);
-        // Lists are complete unless the edges were faster than their velocities at the search.
-        let listed = longest <= self.vicinity.reach.listed();
-        for (first, edge) in self.edges[0].iter().enumerate() {
-            let bounds = swept(&edge.nodes);
-            if !bounds.intersects(&others) {
+        for index in self.lists.pairs() {
+            let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
+            // Edges stopped by a spring penetrate.
+            let springs =
+                self.settings.given_law().is_compliant() && self.rows.identities.binary_search(&index).is_ok();
+            let [one, other] = pair.edges.map(|edge| swept(&edge.nodes));
+            if springs || !one.intersects(&other) {
                 continue;
             }
-            let list = listed.then(|| self.neighborhood.of(first));
-            for k in 0..list.map_or(self.edges[1].len(), <[usize]>::len) {
-                let index = [first, list.map_or(k, |list| list[k])];
-                let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
-                // Edges stopped by a spring penetrate.
-                let springs =
-                    self.settings.given_law().is_compliant() && self.rows.identities.binary_search(&index).is_ok();
-                if springs || !bounds.intersects(&swept(&pair.edges[1].nodes)) {
-                    continue;
-                }
-                if let Err((what, path, gap)) = self.check_path(&pair, (&start, &end)) {
-                    return Err(step.rejected((index[0], index[1]), what, path, gap));
-                }
+            if let Err((what, path, gap)) = self.check_path(&pair, (&start, &end)) {
+                return Err(step.rejected((index[0], index[1]), what, path, gap));
             }
         }
         Ok(())

@@ -169,7 +169,9 @@ impl<T: Real> Metric<T> {
                 let entries = places[column.clone()].iter().zip(&factorized[column]);
                 entries.take_while(|(j, _)| **j <= i).for_each(|(&j, &value)| row[j] = value);
             };
-            return dense.factorize_rows(size, fill).map_err(|dof| Error::Singular { matrix: "rows of contact", dof });
+            return dense
+                .factorize_rows(size, 0.0, fill)
+                .map_err(|dof| Error::Singular { matrix: "rows of contact", dof });
         }
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, starts, None, places);
         let [known_starts, known_places] = analyzed;
