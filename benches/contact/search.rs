@@ -50,10 +50,11 @@ pub(super) fn measure(arguments: &Arguments) {
     let nodes = |passes: usize| stack.nodes_on_facets(passes).expect("surfaces");
     // The ways, in facets, that the upper plate has gone since the last search.
     for (what, way) in [("nothing moved", 0.0), ("lists kept", 1e-3), ("lists anew", 5.0)] {
-        let contacts: [(&str, Box<dyn ContactConstraint<f64>>); 3] = [
+        let contacts: [(&str, Box<dyn ContactConstraint<f64>>); 4] = [
             ("nodes on facets, one pass", Box::new(nodes(1))),
             ("nodes on facets, two passes", Box::new(nodes(2))),
             ("mortar", Box::new(stack.mortar(true).expect("surfaces"))),
+            ("edges on edges, none sharp", Box::new(stack.edges().expect("surfaces"))),
         ];
         for (name, contact) in contacts {
             let mut searched = Searched::new(contact, &stack, way);

@@ -55,10 +55,10 @@ impl Edge {
         edges
     }
 
-    /// Whether the surface is convex there, and turns by more than an angle, with the nodes at these positions.
-    pub(super) fn is_sharp(&self, surface: &Surface, angle: f64, positions: &[Point]) -> bool {
+    /// Whether the surface is convex there, and turns by more than the angle with these sine and cosine.
+    pub(super) fn is_sharp(&self, surface: &Surface, sine_and_cosine: [f64; 2], positions: &[Point]) -> bool {
         let [(facet, side), _] = self.sides;
-        surface.turn(facet, side, positions).is_some_and(|turn| turn > angle)
+        surface.turns(facet, side, sine_and_cosine, positions)
     }
 
     pub(super) fn facets(&self) -> [usize; 2] {

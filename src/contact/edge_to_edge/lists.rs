@@ -28,6 +28,7 @@ impl Lists {
         (nodes, vicinity): (&Nodes, &mut Vicinity),
         range: f64,
     ) {
+        let angle = angle.sin_cos().into();
         for (sharp, (edges, surface)) in self.sharp.iter_mut().zip(edges.iter().zip(surfaces)) {
             if sharp.is_empty() {
                 sharp.extend(edges.iter().map(|edge| edge.is_sharp(surface, angle, &nodes.positions)));

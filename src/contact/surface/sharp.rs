@@ -8,10 +8,11 @@ impl Surface {
     /// surface ends do not count.
     pub(crate) fn sharp_nodes(&self, angle: f64, positions: &[Point]) -> Vec<usize> {
         let mut sharp = Vec::new();
+        let sine_and_cosine = angle.sin_cos().into();
         for (index, facet) in self.facets().iter().enumerate() {
             let nodes = facet.nodes();
             for (side, &first) in nodes.iter().enumerate() {
-                if self.turn(index, side, positions).is_some_and(|turn| turn > angle) {
+                if self.turns(index, side, sine_and_cosine, positions) {
                     sharp.push(first);
                     sharp.extend((nodes.len() > 2).then_some(nodes[(side + 1) % nodes.len()]));
                 }
@@ -22,14 +23,15 @@ impl Surface {
         sharp
     }
 
-    /// The angle by which the surface turns across the middle of a side, positive where it is convex; none where the
-    /// surface ends, or where a normal is not defined.
-    pub(crate) fn turn(&self, facet: usize, side: usize, positions: &[Point]) -> Option<f64> {
-        let (other, across) = self.neighbor(facet, side)?;
+    /// Whether a surface is convex at a side, and turns across the middle of it by more than the angle with these sine
+    /// and cosine. Not where it ends, or where a normal is not defined.
+    pub(crate) fn turns(&self, facet: usize, side: usize, [sine, cosine]: [f64; 2], positions: &[Point]) -> bool {
+        let Some((other, across)) = self.neighbor(facet, side) else { return false };
         let [shape, other] = [facet, other].map(|facet| self.facets()[facet].shape(positions));
-        let own = shape.normal(&shape.on_side(side, 0.5))?;
-        let normal = other.normal(&other.on_side(across, 0.5))?;
-        let turn = norm(cross(own, normal)).atan2(dot(own, normal));
-        Some(if dot(own, sub(other.middle(), shape.corner(side))) < 0.0 { turn } else { -turn })
+        let own = shape.product(&shape.on_side(side, 0.5));
+        let normal = other.product(&other.on_side(across, 0.5));
+        // The sine of the turn less the angle, times the lengths of both products.
+        let exceeds = norm(cross(own, normal)) * cosine > dot(own, normal) * sine;
+        exceeds && dot(own, sub(other.middle(), shape.corner(side))) < 0.0
     }
 }
