@@ -149,7 +149,8 @@ impl<T: Real> JumpProjection<T> {
     }
 
     /// Chooses the rows of G whose jumps are removed, and factorizes their S. Choosing the same rows again costs
-    /// nothing. Dependent rows get the multipliers of least norm.
+    /// nothing. Dependent rows get the multipliers of least norm. A row counts as dependent if others leave less than
+    /// 1e-6 of its S_ii: if it differs from them by less than a milliradian.
     ///
     /// # Errors
     ///
