@@ -8,7 +8,7 @@
 //! - `-- exact [cells a side]` (default 46, 1e5 dofs): forces beside those by a factor and W.
 //! - `-- explicit [cells a side]…` (default 60 and 100): the slab by CD-Lagrange, beside its steps without contact.
 //! - `-- flat [cells a side]…` (default 10, 20 and 40): the slab, without lateral strain, on a flat floor, beside the
-//!   exact solution; `in_mujoco.py` runs the same scene by MuJoCo.
+//!   exact solution; `in_mujoco.py` and `in_kratos.py` run the same scene by MuJoCo and by Kratos.
 //! - `-- picture [cells a side]` (default 100): the slab some time after first contact, in `target/large/slab.vtu`, which
 //!   `picture.py` draws with ParaView.
 
