@@ -19,24 +19,37 @@ impl<T: Real> EdgeToEdge<T> {
         if self.edges.iter().any(Vec::is_empty) || longest <= FINE * self.finest {
             return Ok(());
         }
-        // They are complete already unless the edges were faster than their velocities at the search.
-        self.update_lists(longest);
         let mut ends = std::mem::take(&mut self.ends);
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        let result = self.check_paths(step, &ends);
+        let swept =
+            |nodes: &Vec<usize>| Bounds::of_points(nodes.iter().flat_map(|&node| [ends[0][node], ends[1][node]]));
+        let [one, other] = self.nodes.bodies().each_ref().map(swept);
+        let mut result = self.check_rows(step, &ends);
+        if result.is_ok() && one.intersects(&other) {
+            // The lists are complete already unless the edges were faster than their velocities at the search.
+            self.update_lists(longest);
+            result = self.check_paths(step, &ends);
+        }
         self.ends = ends;
         result
     }
 
-    fn check_paths(&self, step: &Stride<'_, T>, ends: &[Vec<Point>; 2]) -> Result<()> {
+    /// Rejects a step in which rows have stopped edges apart.
+    fn check_rows(&self, step: &Stride<'_, T>, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
         for (row, &index) in self.rows.identities.iter().enumerate() {
             if let Err((what, path, gap)) = self.check_row(row, step, index, (&start, &end)) {
                 return Err(step.rejected((index[0], index[1]), what, path, gap));
             }
         }
+        Ok(())
+    }
+
+    /// Rejects a step in which edges went through each other.
+    fn check_paths(&self, step: &Stride<'_, T>, ends: &[Vec<Point>; 2]) -> Result<()> {
+        let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
         let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
         for index in self.lists.pairs() {
             let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
