@@ -1,6 +1,6 @@
-# The scene of `cargo bench --bench large -- flat` by Kratos (pip install KratosContactStructuralMechanicsApplication): a
-# slab of cubes that falls on a flat floor, with weighted gaps by an augmented Lagrangian. What is not set below is as
-# Kratos sets it: Bossak's scheme, a consistent mass, the linear solver, all threads.
+# The scene of `cargo bench --bench large -- flat` by Kratos (pip install KratosContactStructuralMechanicsApplication):
+# a slab of cubes that falls on a flat floor, with weighted gaps by an augmented Lagrangian. What is not set below is
+# as Kratos sets it: Bossak's scheme, a consistent mass, the linear solver, all threads.
 #
 #   python benches/large/in_kratos.py [cells a side]…
 import json
