@@ -64,11 +64,6 @@ pub(crate) fn split_of_root(multiplicity: usize) -> f64 {
 
 // Contact solvers.
 
-/// A closed row is a combination of others if these leave less than this share of its S_ii: rows of the same node that
-/// differ by a milliradian. As equations of their own such rows would ask for a thousand times the accelerations by
-/// which they differ (theory, section 5.4).
-pub(crate) const ONE_ROW: f64 = 1e-6;
-
 /// The share of √(W_ii W_jj) by which W_ij and W_ji of a symmetric W may differ: the rounding of 64 terms.
 pub(crate) fn asymmetry<T: Float>() -> T {
     rounding(number(64.0))
@@ -97,6 +92,11 @@ pub(crate) fn smallest_gap<T: Float>() -> T {
 }
 
 // Correctors.
+
+/// A closed row is a combination of others if these leave less than this share of its S_ii: rows of the same node that
+/// differ by a milliradian. As equations of their own such rows would ask for a thousand times the accelerations by
+/// which they differ (theory, section 5.4).
+pub(crate) const ONE_ROW: f64 = 1e-6;
 
 /// How many roundings of a gap the sums of a step may add to it. A number.
 pub(crate) const ROUNDINGS_OF_STEP: f64 = 32.0;

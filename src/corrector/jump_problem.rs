@@ -403,8 +403,9 @@ impl<T: Real> Group<T> {
         let slides = !friction.is_empty();
         let friction = |i: usize, j: usize| friction.get(i * size + j).copied().unwrap_or(T::zero());
         let failure = |iterations| move |row| ContactFailure::NotConverged { iterations, row, residual: T::nan() };
-        let entry = |i: usize, j: usize| delassus[i * size + j] - friction(i, j);
-        let fill = |i: usize, row: &mut [T]| row.iter_mut().enumerate().for_each(|(j, x)| *x = entry(i, j));
+        let fill = |i: usize, row: &mut [T]| {
+            row.iter_mut().enumerate().for_each(|(j, x)| *x = delassus[i * size + j] - friction(i, j));
+        };
         factor.factorize_rows(size, ONE_ROW, fill).map_err(failure(0))?;
         multipliers.fill(T::zero());
         next.resize(size, T::zero());

@@ -29,9 +29,13 @@ impl Lists {
         range: f64,
     ) {
         let angle = angle.sin_cos().into();
-        for (sharp, (edges, surface)) in self.sharp.iter_mut().zip(edges.iter().zip(surfaces)) {
-            if sharp.is_empty() {
-                sharp.extend(edges.iter().map(|edge| edge.is_sharp(surface, angle, &nodes.positions)));
+        let [first, second] = &mut self.sharp;
+        if first.is_empty() {
+            let turns = |surface: &Surface, edge: &Edge| edge.is_sharp(surface, angle, &nodes.positions);
+            first.extend(edges[0].iter().map(|edge| turns(&surfaces[0], edge)));
+            match vicinity.is_of_itself() {
+                true => second.clone_from(first),
+                false => second.extend(edges[1].iter().map(|edge| turns(&surfaces[1], edge))),
             }
         }
         let (Self { sharp, listed, near }, Vicinity { reach, .. }) = (self, vicinity);

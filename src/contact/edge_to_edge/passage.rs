@@ -23,9 +23,7 @@ impl<T: Real> EdgeToEdge<T> {
         for (positions, u) in ends.iter_mut().zip(step.u) {
             self.nodes.places_at(u, positions);
         }
-        let swept =
-            |nodes: &Vec<usize>| Bounds::of_points(nodes.iter().flat_map(|&node| [ends[0][node], ends[1][node]]));
-        let [one, other] = self.nodes.bodies().each_ref().map(swept);
+        let [one, other] = self.nodes.bodies().each_ref().map(|nodes| swept(nodes, &ends));
         let mut result = self.check_rows(step, &ends);
         if result.is_ok() && one.intersects(&other) {
             // The lists are complete already unless the edges were faster than their velocities at the search.
@@ -50,13 +48,12 @@ impl<T: Real> EdgeToEdge<T> {
     /// Rejects a step in which edges went through each other.
     fn check_paths(&self, step: &Stride<'_, T>, ends: &[Vec<Point>; 2]) -> Result<()> {
         let [start, end] = [0, 1].map(|k| move |node: usize| ends[k][node]);
-        let swept = |nodes: &[usize]| Bounds::of_points(nodes.iter().flat_map(|&node| [start(node), end(node)]));
         for index in self.lists.pairs() {
             let Some(pair) = self.sides(step.t[1]).meeting(index) else { continue };
             // Edges stopped by a spring penetrate.
             let springs =
                 self.settings.given_law().is_compliant() && self.rows.identities.binary_search(&index).is_ok();
-            let [one, other] = pair.edges.map(|edge| swept(&edge.nodes));
+            let [one, other] = pair.edges.map(|edge| swept(&edge.nodes, ends));
             if springs || !one.intersects(&other) {
                 continue;
             }
@@ -138,4 +135,9 @@ impl<T: Real> EdgeToEdge<T> {
         }
         Ok(())
     }
+}
+
+/// The box of nodes at both ends of a step.
+fn swept(nodes: &[usize], ends: &[Vec<Point>; 2]) -> Bounds {
+    Bounds::of_points(nodes.iter().flat_map(|&node| [ends[0][node], ends[1][node]]))
 }
